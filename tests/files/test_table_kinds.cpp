@@ -356,6 +356,27 @@ TEST_CASE("units are read as machines write them, and weights ask for the force 
              Contains("--unit \"Load=lbf\""));
 }
 
+TEST_CASE("a unit is said of a column by its name, whole title or number, and of no other") {
+  const Reader read;
+  const std::string table = "time (s),depth (mm),force (N)\n0,0,0\n1,1,1\n2,1,0.5\n";
+  for (const char* selector : {"force", "force (N)", "3"}) {
+    INFO(selector);
+    ImportOptions milli;
+    milli.units[selector] = "mN";
+    CHECK_THAT(read(table, milli).recording.response.at(1), WithinRel(1e-3, 1e-12));
+  }
+  for (const char* selector : {"Force", "load", "4", "force (mN)"}) {
+    INFO(selector);
+    ImportOptions milli;
+    milli.units[selector] = "mN";
+    CHECK_THAT(read.refusal(table, milli), Contains("no column '") && Contains("--unit names"));
+  }
+  ImportOptions titles;
+  titles.time_column = "time (s)";
+  titles.response_column = "force (N)";
+  CHECK(read(table, titles).recording.response == read(table).recording.response);
+}
+
 TEST_CASE("a column of another title is time, drive or force if nothing else can be") {
   const Reader read;
   const auto table = [](const std::string& titles) {

@@ -88,8 +88,9 @@ def main():
         for plan in ("servo.json", "creep.json"):
             checks.check(["simulate", root / "configs/plan" / plan, "--planned", "--costs", "nominal", "-o", "planned.h5"],
                          remarks)
-        subprocess.run([program, "hil", "run", root / "configs/hil_liver.json", "-o", "session.tpmrec"], cwd=folder, check=True,
-                       capture_output=True)
+        told = checks.run("hil", "run", root / "configs/hil_liver.json", "-o", "session.tpmrec").stdout.splitlines()
+        if len(told) > MOST or told[-1:] != ["next: tpm hil verify session.tpmrec"]:
+            checks.faults.append(f"hil run: {len(told)} lines, ends with {told[-1:]}")
         checks.check(["hil", "verify", "session.tpmrec"], remarks)
         for more in ([], ["--verbose"]):
             told = checks.run("hil", "report", "session.tpmrec", "--folder", "page", "--overwrite", *more).stdout

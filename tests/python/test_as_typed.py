@@ -1,6 +1,9 @@
 """What users type: tables as they come out of pandas and xarray, numbers of numpy, arguments that are wrong."""
 
+import html
 import json
+import subprocess
+import sys
 import tempfile
 import unittest
 from pathlib import Path
@@ -32,6 +35,25 @@ class Tables(unittest.TestCase):
     def test_units_of_a_table_are_told_by_column(self):
         plain = self.table.set_axis(["time", "depth", "force"], axis=1)
         self.assertTrue(tpmkit.fit(plain, units=UNITS, **QUICK).parameters.equals(self.fit.parameters))
+
+    def test_a_unit_of_a_column_that_is_not_there_is_refused(self):
+        plain = self.table.set_axis(["time", "depth", "force"], axis=1)
+        with self.assertRaisesRegex(tpmkit.Error, "no column 'load'"):
+            tpmkit.fit(plain, units={**UNITS, "load": "N"}, **QUICK)
+        # By its whole title, which is the name of a column of a DataFrame.
+        milli = tpmkit.fit(self.table, units={"force (N)": "mN"}, **QUICK).parameters.estimate
+        self.assertAlmostEqual(1e3 * milli["k_inf"] / self.fit.parameters.estimate["k_inf"], 1.0, places=3)
+
+    def test_what_follows_from_a_fit_shows_its_adequacy_and_warnings(self):
+        protocol = tpmkit.Protocol.ramp_and_hold(9e-3, 1e-3, 10.0)  # deeper than what was fitted
+        for table in (self.fit.predict(protocol, [0.0, 9.0]), self.fit.young_moduli(sphere_radius_m=1e-3)):
+            self.assertEqual(table.adequacy, self.fit.adequacy)
+            self.assertTrue(table.warnings)
+            for words in (table.adequacy["summary"], *table.warnings):
+                self.assertIn(words, repr(table))
+        page = html.unescape(self.fit._repr_html_())
+        for words in (self.fit.adequacy["summary"], *self.fit.warnings):
+            self.assertIn(words, page)
 
     def test_a_filtered_table_is_fitted(self):
         rows = self.table[self.table["time (s)"] < 10.0]
@@ -135,6 +157,110 @@ class Arguments(unittest.TestCase):
                 call()
             self.assertNotIn("\n", str(raised.exception))
             self.assertIsInstance(raised.exception, ValueError)
+
+    def test_what_reads_a_list_of_numbers_guesses_nothing(self):
+        """A mask, a unit, a length of time or a text that carries more than its numbers is refused, not stripped."""
+        law = tpmkit.Law("linear-1", {"k_inf": 60, "k1": 1, "tau1": 1})
+        step = tpmkit.Protocol.ramp_and_hold(1e-3, 1e-3, 10.0)
+        quantity = type("Quantity", (), {"magnitude": 1.0, "units": "mm", "__array__": lambda self, *a, **k: np.arange(3.0)})()
+        t = np.arange(3.0)
+        for values, words in (
+            (np.ma.masked_array(t, [0, 1, 0]), "is masked at place 1"),
+            (pd.to_timedelta(t, unit="s"), r"holds timedelta64\[ns\]; expected numbers, such as \(t - t\[0\]\)"),
+            (quantity, "is a Quantity with a unit of its own"),
+            (["0", "1", "2"], "holds <U1"),
+            ([True, False, True], "holds bool"),
+            ([0, 10**400, 2], r"is \[0, 1000.*; expected a list of numbers"),
+            ([[1, 2], [3]], r"is \[\[1, 2\], \[3\]\]; expected a list of numbers"),
+            ((x for x in t), "is a generator; expected a list of numbers"),
+            (None, "is None; expected a list of numbers"),
+        ):
+            with self.subTest(words=words):
+                with self.assertRaisesRegex(tpmkit.ArgumentError, "^times_s: " + words) as raised:
+                    law.respond(step, values)
+                self.assertNotIn("\n", str(raised.exception))
+                if values is not None:
+                    with self.assertRaisesRegex(tpmkit.ArgumentError, "^fit: depth " + words):
+                        tpmkit.fit(time=t, depth=values, force=t, units=UNITS)
+        read = tpmkit.read_recording(tpmkit.example("recording.csv"))
+        with self.assertRaisesRegex(tpmkit.ArgumentError, "depth is in m and units says mm"):
+            tpmkit.fit(time=read.time_s, depth=read.depth_m, force=read.force_N, units=UNITS)
+
+    def test_arguments_that_the_program_or_the_library_refuses_are_value_errors(self):
+        example, law = tpmkit.example("recording.csv"), tpmkit.Law("linear-1", {"k_inf": 60, "k1": 1, "tau1": 1})
+        step, servo = tpmkit.Protocol.ramp_and_hold(1e-3, 1e-3, 10.0), tpmkit.example("configs/plan/servo.json")
+        table = pd.DataFrame({"time (s)": [0.0, 1.0], "depth (mm)": [0.0, 1.0], "force (N)": [0.0, 1.0]})
+        times = table.assign(**{"time (s)": pd.to_timedelta(table["time (s)"], unit="s")})
+        for call, words in (
+            (lambda: tpmkit.fit(example, law="linear-one"), "^law: unknown law 'linear-one'"),
+            (lambda: tpmkit.Law("linear-one", {}), "^law: unknown law 'linear-one'"),
+            (lambda: tpmkit.Law("linear-1", {"k_inf": 60}), "no parameter 'k1_N_per_m'"),
+            (lambda: tpmkit.Law("linear-1", None), "parameters are None"),
+            (lambda: tpmkit.Law.describe("x"), "unknown law 'x'"),
+            (lambda: law.respond(step, [99.0]), "asked for t = 99 s; expected a time from 0 to 11 s"),
+            (lambda: law.respond_spectrum([-1.0]), "expected a frequency above 0 Hz"),
+            (lambda: step.scaled("2"), "^scaled: factor is '2'"),
+            (lambda: step.scaled(float("nan")), "^scaled: factor is nan"),
+            (lambda: step.value_at("now"), "^time_s: "),
+            (lambda: tpmkit.Protocol(), "^Protocol: .*expected Protocol.step_and_hold"),
+            (lambda: tpmkit.fit(example, columns={"nope": "x"}), "columns names 'nope'; expected keys of encoding"),
+            (lambda: tpmkit.fit(example, columns={1: "x"}), "columns names 1"),
+            (lambda: tpmkit.fit(example, columns={"units": "mm"}), "units is 'mm'; expected a dict"),
+            (lambda: tpmkit.fit(example, columns={"units": {"force": 3}}), "units has 'force': 3"),
+            (lambda: tpmkit.fit(example, columns={"segments": "load"}), "segments is 'load'; expected a list"),
+            (lambda: tpmkit.fit(example, columns={"time": None}), "time is None"),
+            (lambda: tpmkit.read_recording(example, columns=["x"]), r"columns is \['x'\]; expected a dict"),
+            (lambda: tpmkit.validate(law, example, columns={"nope": 1}), "columns names 'nope'"),
+            (lambda: tpmkit.validate(law, {"time": [1]}), "recordings is {'time'"),
+            (lambda: tpmkit.validate(law, example, require="10"), "'10' has no unit"),
+            (lambda: tpmkit.fit(""), "files holds ''"),
+            (lambda: tpmkit.fit([3]), "files holds 3"),
+            (lambda: tpmkit.fit([example.parent, example]), "is a folder among files"),
+            (lambda: tpmkit.fit(table[:0]), "the table has 0 rows"),
+            (lambda: tpmkit.fit(times), r"time \(s\) holds timedelta64\[ns\]"),
+            (lambda: tpmkit.plan(servo, outputs="x"), "outputs is 'x'"),
+            (lambda: tpmkit.plan(servo, rate_Hz=float("nan")), "rate_Hz is nan"),
+            (lambda: tpmkit.design({}, repetitions=1.5), "'1.5'; expected a whole number"),
+            (lambda: tpmkit.view(table, "page.html"), r"^view\(a DataFrame, 'page.html'\)"),
+        ):
+            with self.subTest(words=words), self.assertRaisesRegex(tpmkit.ArgumentError, words) as raised:
+                call()
+            self.assertNotIn("\n", str(raised.exception))
+            self.assertIsInstance(raised.exception, ValueError)
+
+    def test_columns_are_the_options_that_the_library_reads(self):
+        from tpmkit._tables import KEYS
+
+        with self.assertRaises(tpmkit.Error) as raised:
+            tpmkit._core.read_recording(str(tpmkit.example("recording.csv")), {"nope": "x"})
+        told = str(raised.exception).partition("one of ")[2].split(", ")
+        self.assertEqual(set(KEYS), {*told, "provenance"})
+
+    def test_nothing_of_the_user_is_overwritten_by_a_page(self):
+        with tempfile.TemporaryDirectory() as folder:
+            law, file, page = Path(folder) / "law.json", Path(folder) / "data.csv", Path(folder) / "page.html"
+            tpmkit.Law("linear-1", {"k_inf": 60, "k1": 1, "tau1": 1}).write(law)
+            file.write_text("precious")
+            with self.assertRaisesRegex(tpmkit.ArgumentError, "data.csv is there already and is no page"):
+                tpmkit.view(law, file)
+            self.assertEqual(file.read_text(), "precious")
+            tpmkit.view(law, page)
+            tpmkit.view(law, page)  # a page is replaced
+
+    def test_no_example_lies_outside_of_what_is_installed(self):
+        for name in ("../../etc/passwd", "/etc/passwd"):
+            with self.assertRaisesRegex(tpmkit.Error, "^example: "):
+                tpmkit.example(name)
+
+    def test_a_module_that_is_missing_is_told_in_a_sentence(self):
+        code = ("import sys, tpmkit; sys.modules['h5py'] = sys.modules['h5netcdf'] = None\n"
+                "try: tpmkit.open(sys.argv[1])\nexcept tpmkit.Error as error: print(error.code, error)")
+        with tempfile.TemporaryDirectory() as folder:
+            file = Path(folder) / "result.h5"
+            with h5py.File(file, "w") as made_file:
+                made_file.create_group("x")
+            told = subprocess.run([sys.executable, "-c", code, file], capture_output=True, text=True, check=True).stdout
+        self.assertRegex(told, "^5 open: Python cannot import h5py .*; expected it installed")
 
     def test_numbers_of_numpy_and_paths_are_taken(self):
         law = tpmkit.Law("linear-1", {"k_inf": np.float32(60), "k1": np.int64(45), "tau1": 2.0})

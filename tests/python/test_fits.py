@@ -161,7 +161,7 @@ class Fits(unittest.TestCase):
             ({"time": t, "depth": t, "units": units}, "force missing"),
             ({"time": t, "depth": t[:4], "force": t, "units": units}, "depth has 4 values and time 5"),
             ({"time": t.reshape(1, 5), "depth": t, "force": t, "units": units}, r"time has the shape \(1, 5\)"),
-            ({"time": t, "depth": t, "force": [1, 2, None, 4, 5], "units": units}, "force is nan at place 2"),
+            ({"time": t, "depth": t, "force": [1, 2, None, 4, 5], "units": units}, "force is NaN at place 2"),
             ({"time": t, "depth": t, "force": list("abcde"), "units": units}, "expected numbers"),
             ({"files": pd.DataFrame({"a": t, "b": t, "c": t})}, "^table: "),
             ({"files": self.file, "starts": 0.5}, "starts is 0.5"),

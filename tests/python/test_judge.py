@@ -32,6 +32,7 @@ class Judgements(unittest.TestCase):
         self.assertGreater(row.upper, made.LAW["tau1_s"])
         self.assertEqual(row.unit, "s")
         self.assertIn(row.summary, repr(pooled))
+        self.assertIn(f"tau1 {row.typical:.5g} ({row.lower:.4g} .. {row.upper:.4g}) s: ", repr(pooled))
         self.assertEqual(pooled.adequacy["verdict"], "not_judged")  # nothing rests before contact
         self.assertEqual(len(pooled.adequacy["not_judged"]), 3)
         for words in (pooled.adequacy["summary"], *pooled.warnings):

@@ -64,7 +64,7 @@ class Laws(unittest.TestCase):
         law = tpmkit.Law("linear-1", LAW)
         for call in (lambda: law.respond(3, [1.0]), lambda: tpmkit.Law.describe(3),
                      lambda: tpmkit.Element().respond("step", [1.0]), lambda: law.write(3), lambda: tpmkit.Law.read(3),
-                     lambda: tpmkit.fit(3), lambda: tpmkit.fit([3]), lambda: tpmkit.simulate(3), lambda: tpmkit.plan(3),
+                     lambda: tpmkit.simulate(3), lambda: tpmkit.plan(3),
                      lambda: tpmkit.sweep(3, "s.h5"), lambda: tpmkit.open(3), lambda: tpmkit.read_recording(3), lambda: tpmkit.view(3, "v.html"),
                      lambda: tpmkit.design(3), lambda: tpmkit.validate("law.json", 3), lambda: tpmkit.validate("law.json", "a.csv", instrument=3),
                      lambda: tpmkit.Contact(3), lambda: tpmkit.run_session(3, "s.tpmrec"), lambda: tpmkit.example(3)):
@@ -75,7 +75,7 @@ class Laws(unittest.TestCase):
             tpmkit.simulate(law)
         with self.assertRaisesRegex(tpmkit.Error, r"^Law.describe\(3\): an argument"):
             tpmkit.Law.describe(3)
-        with self.assertRaisesRegex(tpmkit.Error, "times_s: 'now'; expected a list of numbers"):
+        with self.assertRaisesRegex(tpmkit.Error, "times_s: is 'now'; expected a list of numbers"):
             law.respond(tpmkit.Protocol.step_and_hold(1e-3, 2.0), "now")
 
     def test_laws_protocols_and_elements_are_pickled_and_copied(self):

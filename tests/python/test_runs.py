@@ -1,7 +1,9 @@
 """Scenes run, sweeps computed, results and recordings opened."""
 
+import copy
 import json
 import os
+import pickle
 import signal
 import subprocess
 import sys
@@ -117,6 +119,9 @@ class Runs(unittest.TestCase):
             with tpmkit.sweep(file, Path(folder) / "sweep.h5", workers=1) as data:
                 lambda1 = 2 * 12e3 * (1 - np.cos(np.arctan(data.depth / data.x)))  # Eqs. 2 and 15
                 np.testing.assert_allclose(data.peak_force, (12e3 + lambda1) * data.depth * 12.56e-3, rtol=1e-12)
+            with tpmkit.open(Path(folder) / "sweep.h5") as data:
+                self.assertTrue(pickle.loads(pickle.dumps(data)).identical(data))
+                self.assertTrue(copy.deepcopy(data).identical(data))
             told = []
             with tpmkit.sweep(file, Path(folder) / "sweep.h5", progress=lambda *t: told.append(t)):
                 self.assertEqual(told, [])  # it was only opened

@@ -99,6 +99,7 @@ inline std::vector<ErrorCase> machine_cases() {
       {type, "wrong column", import, machine("a,b,c\n0,0,0\n1,1,1\n")},
       {type, "no unit", import, machine("Time,Force,Depth\n0,0,0\n1,1,1\n")},
       {type, "wrong unit", import, machine("Time,Force,Depth\ns,mm,mm\n0,0,0\n1,1,1\n")},
+      {type, "unit of no column", import + " --unit Last=mN", machine(head + "0,0,0\n1,1,1\n")},
       {type, "no number", import, machine(head + "0,0,0\n1,high,1\n")},
       {type, "NaN", import, machine(head + "0,0,0\n1,nan,1\n")},
       {type, "NaN that leaves too few", "fit {}/m.csv --no-draw",

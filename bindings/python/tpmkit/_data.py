@@ -7,7 +7,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Iterator, Mapping
 
 from . import _core
-from ._kinds import told
+from ._kinds import needed, told
+from ._tables import reading_of
 
 if TYPE_CHECKING:
     import xarray
@@ -44,11 +45,12 @@ def example(name: str) -> Path:
     ``example("recording.csv")``. Raises tpmkit.Error if there is none, or several of that name."""
     share = Path(_core.share_dir())
     path = share / os.fspath(name)
-    if path.is_file():
+    if path.is_file() and path.resolve().is_relative_to(share.resolve()):
         return path
     if Path(name).name != name:
         folder = path.parent
-        there = sorted(p.name for p in folder.iterdir() if p.is_file()) if folder.is_dir() else []
+        inside = folder.is_dir() and folder.resolve().is_relative_to(share.resolve())
+        there = sorted(p.name for p in folder.iterdir() if p.is_file()) if inside else []
     else:
         found = [p for folder in ("configs", "data") for p in sorted((share / folder).rglob("*")) if p.is_file() and p.name == name]
         if len(found) == 1:
@@ -66,7 +68,7 @@ def read_recording(path: str | os.PathLike[str], *, columns: Mapping[str, Any] |
     import numpy as np
     import xarray
 
-    r = _core.read_recording(os.fspath(path), dict(columns or {}))
+    r = _core.read_recording(os.fspath(path), reading_of("read_recording", columns))
     n = len(r["response"])
     timed = len(r["time_s"]) == n
     along = "time_s" if timed else "sample"
@@ -107,7 +109,9 @@ def open_sweep(path: str | os.PathLike[str]) -> xarray.Dataset:
     """Results of `tpm sweep`: variables over the axes, with units; status 0 where a cell has an answer."""
     import xarray
 
-    data = xarray.open_dataset(os.fspath(path), engine="h5netcdf")
+    needed("h5netcdf", "open")
+    # Without xarray's lock, which cannot be pickled: h5py has one of its own.
+    data = xarray.open_dataset(os.fspath(path), engine="h5netcdf", lock=False)
     wrong = int((data["status"] != 0).sum())
     data.attrs["adequacy"] = "undetermined: computed answers, compared with no measurement"
     data.attrs["warnings"] = [f"{wrong} of {data['status'].size} cells have no answer; status and reason say why"] if wrong else []
@@ -127,9 +131,10 @@ def _passed_limits(file: Any) -> Iterator[str]:
 def open_simulation(path: str | os.PathLike[str]) -> xarray.Dataset:
     """Results of `tpm simulate`, as `tpmkit.simulate` returns them. The library has no reader for its own
     results; h5py reads them here."""
-    import h5py
     import numpy as np
     import xarray
+
+    h5py = needed("h5py", "open")
 
     with h5py.File(os.fspath(path), "r") as file:
         curve = {k: v[()].ravel() for k, v in file["curve"].items()}
@@ -158,11 +163,9 @@ def open(path: str | os.PathLike[str]) -> xarray.Dataset:  # noqa: A001: tpmkit.
         return open_session(path)
     if suffix != ".h5":
         return read_recording(path)
-    import h5py
-
     if not Path(path).is_file():
         raise _core.Error(f"{os.fspath(path)}: there is no such file; expected a result of tpm simulate or tpm sweep")
-    wanted = "expected a result of tpm simulate or tpm sweep"
+    h5py, wanted = needed("h5py", "open"), "expected a result of tpm simulate or tpm sweep"
     try:
         with h5py.File(os.fspath(path), "r") as file:
             keys = set(file)

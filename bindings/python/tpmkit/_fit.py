@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import html
 import json
 import os
 from collections.abc import Iterable, Mapping
@@ -13,10 +14,10 @@ import numpy as np
 
 from . import _core, _program
 from ._core import Protocol
-from ._kinds import shown, told
+from ._kinds import needed, of_arguments, shown, told
 from ._law import Law, number_of, times_of
 from ._specimens import Specimens
-from ._tables import TABLE, by_file, csv_of, frame_of, is_table, options_of, reading_of, renamed
+from ._tables import TABLE, by_file, csv_of, frame_of, is_table, options_of, reading_of, renamed, same_error
 
 if TYPE_CHECKING:
     import numpy.typing as npt
@@ -286,8 +287,8 @@ class Fit:
         Returns
         -------
         DataFrame by time_s: value, and standard_error from the parameters' covariance (delta method; NaN
-        where that is not of full rank). Its `warnings`, which its repr shows, say where it extrapolates, in the words
-        of `tpm predict`.
+        where that is not of full rank). Its `warnings` say where it extrapolates, in the words of `tpm predict`, and
+        its `adequacy` is that of the fit; its repr shows both.
         """
         import pandas as pd
 
@@ -298,8 +299,9 @@ class Fit:
         times = times_of(times_s)
         most = 0 if type(dataset) is int and dataset == 0 else len(self._fitted["choices"]) - 1
         place = _whole("predict", "dataset", dataset, 0, most)
-        value, error, warnings = self._core.predict(protocol, times, place, placement == "surface")
+        value, error, warnings = of_arguments(self._core.predict)(protocol, times, place, placement == "surface")
         table = Prediction({"value": value, "standard_error": error}, index=pd.Index(times, name="time_s"))
+        table.attrs["adequacy"] = self._judged()
         table.attrs["warnings"] = warnings
         return table
 
@@ -311,35 +313,36 @@ class Fit:
         cone_half_angle_rad: float | None = None,
         punch_radius_m: float | None = None,
         poisson_ratio: float | None = None,
-    ) -> pd.DataFrame:
+    ) -> Prediction:
         """Young's modulus of each stiffness of the law under one rigid probe, as `tpm fit --radius` prints it.
 
         One row per modulus, by name ("E_inf", "E1", "E_instantaneous"): estimate, standard_error, lower, upper, unit,
-        verdict, of. `attrs`: geometry, poisson_ratio (0.49, assumed, unless it is given), warnings.
+        verdict, of. `attrs`: geometry, poisson_ratio (0.49, assumed, unless it is given). Its `adequacy` is that of the fit;
+        its repr shows it and its `warnings`.
         """
-        import pandas as pd
+        from ._prediction import Prediction
 
         sizes = {"sphere_radius_m": sphere_radius_m, "cone_half_angle_rad": cone_half_angle_rad, "punch_radius_m": punch_radius_m}
         for name, value in sizes.items():
             if value is not None and not number_of("young_moduli", name, value) > 0.0:
                 raise _core.ArgumentError(f"young_moduli: {name} is {value!r:.60}; expected a number above 0")
-        said = json.loads(self._core.young_moduli(sphere_radius_m, cone_half_angle_rad, punch_radius_m, poisson_ratio))
+        said = json.loads(of_arguments(self._core.young_moduli)(sphere_radius_m, cone_half_angle_rad, punch_radius_m, poisson_ratio))
         rows = []
         for m in said["moduli"]:
             lower, upper = m.get("interval_SI") or (None, None)
             rows.append({"name": m["name"], "estimate": m["estimate_SI"], "standard_error": m.get("standard_error_SI"),
                          "lower": lower, "upper": upper, **{k: m[k] for k in ("unit", "verdict", "of")}})
-        table = pd.DataFrame(rows).set_index("name")
+        table = Prediction(rows).set_index("name")
         table[["standard_error", "lower", "upper"]] = table[["standard_error", "lower", "upper"]].astype(float)
         table.attrs = {k: said[k] for k in ("geometry", "poisson_ratio", "poisson_ratio_provenance")}
+        table.attrs["adequacy"] = self._judged()
         table.attrs["warnings"] = [remark["text"] for remark in said["remarks"]]
         return table
 
     def plot(self, recording: int = 0, ax: Axes | None = None) -> Axes:
         """Draws a recording with the fitted law and its prediction band; samples outside the window that was
         fitted are grey. Needs matplotlib."""
-        import matplotlib.pyplot as plt
-
+        plt = needed("matplotlib.pyplot", "plot")
         frames = self.data
         if not frames:
             raise _core.Error("plot: the fit has no recording; expected a fit of recordings")
@@ -408,11 +411,7 @@ class Fit:
         for name, row in self.parameters.iterrows():
             interval = " .. ".join("open" if np.isnan(v) else f"{v:.4g}" for v in (row["lower"], row["upper"]))
             lines.append(f"  {name} {row['estimate']:.5g} ({interval}) {row['unit']}, {row['verdict']}")
-        adequacy = self.adequacy
-        lines.append("  adequacy: " + (adequacy["summary"] if adequacy else "not tested"))
-        doubted = adequacy["summary"] if adequacy else None
-        lines += [f"  warning: {w}" for w in self.warnings if w != doubted]
-        return "\n".join(lines) + ">"
+        return "\n".join([*lines, *(f"  {words}" for words in self._remarks_shown())]) + ">"
 
     def __copy__(self) -> Fit:
         return self
@@ -426,7 +425,16 @@ class Fit:
         return _unpickled, (_answers_of(self._core), self._inputs)
 
     def _repr_html_(self) -> str:
-        return self.parameters.to_html(float_format=lambda v: f"{v:.4g}")
+        table = self.parameters.to_html(float_format=lambda v: f"{v:.4g}")
+        return table + "".join(f"<p>{html.escape(words)}</p>" for words in self._remarks_shown())
+
+    def _judged(self) -> dict[str, Any]:
+        return self.adequacy or {"verdict": "not_judged", "summary": "not tested"}
+
+    def _remarks_shown(self) -> list[str]:
+        """Adequacy and warnings, as every repr shows them."""
+        adequacy = self._judged()["summary"]
+        return [f"adequacy: {adequacy}", *(f"warning: {w}" for w in self.warnings if w != adequacy)]
 
 
 def _fit_table(table: Any, options: tuple[Any, ...]) -> Fit:
@@ -517,6 +525,8 @@ def fit(
 
     reading = reading_of("fit", columns, None if arrays else units)
     options = (law, starts, seed, *placement.values(), reading)
+    if law is not None:
+        of_arguments(_core.law_parameters)(law)
     if arrays:
         return _fit_table(frame_of("fit", {"time": time, "depth": depth, "force": force}, units), options)
     if is_table(files):
@@ -525,17 +535,25 @@ def fit(
         return _fit_table(files, options)
     if isinstance(files, (Mapping, np.ndarray)):
         raise _core.ArgumentError(f"fit: files is a {type(files).__name__}; expected files, a DataFrame, or time, depth and force with units")
-    if isinstance(files, (str, os.PathLike)) or not isinstance(files, Iterable):
-        if os.path.isdir(os.fspath(files)):  # type: ignore[arg-type]
-            words = ["fit", os.fspath(files), "--no-draw", *options_of(reading)]  # type: ignore[arg-type, list-item]
+    if isinstance(files, (str, bytes, os.PathLike)) or not isinstance(files, Iterable):
+        if isinstance(files, (str, os.PathLike)) and os.path.isdir(files):
+            words = ["fit", os.fspath(files), "--no-draw", *options_of(reading)]
             said = {"laws": law, "starts": starts, "seed": seed, **placement}
             for key, value in said.items():
                 unit = " " + units_of[key] if key in units_of else ""
                 words += [] if value is None else ["--" + key.replace("_", "-"), f"{value}{unit}"]
-            return Specimens(_program.answer(words))
+            try:
+                return Specimens(_program.answer(words))
+            except _core.Error as error:
+                raise same_error(error, {"laws: unknown law": "law: unknown law"}) from None
         files = [files]  # type: ignore[list-item]
     several = list(files)  # type: ignore[arg-type]
     if any(is_table(f) for f in several):
         raise _core.ArgumentError("fit: files holds tables; expected one table, or files")
+    for one in several:
+        if not isinstance(one, (str, os.PathLike)) or one == "":
+            raise _core.ArgumentError(f"fit: files holds {shown(one)}; expected the paths of recordings")
+        if os.path.isdir(one):
+            raise _core.ArgumentError(f"fit: {os.fspath(one)} is a folder among files; expected files, or one folder alone")
     names = [os.fspath(f) for f in several]
     return Fit(_core.fit(names, *options), _Inputs(tuple(os.path.abspath(n) for n in names), options))

@@ -12,9 +12,11 @@ from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
+
 from . import _core, _program
 from ._fit import Fit, PathLike
-from ._kinds import json_text, told
+from ._kinds import json_text, shown, told
 from ._law import Law
 from ._tables import TABLE, csv_of, is_table, options_of, reading_of, renamed, same_error
 
@@ -126,6 +128,8 @@ def validate(
             file.write_text(csv_of("validate", recordings), encoding="utf-8", newline="")
             names[str(file)] = TABLE
             recordings = file
+        if isinstance(recordings, (Mapping, np.ndarray)):
+            raise _core.ArgumentError(f"validate: recordings is {shown(recordings)}; expected files, or a DataFrame")
         alone = isinstance(recordings, (str, os.PathLike)) or not isinstance(recordings, Iterable)
         files = [os.fspath(f) for f in ([recordings] if alone else recordings)]  # type: ignore[union-attr, list-item]
         if not files:
@@ -199,12 +203,18 @@ def design(problem: PathLike | Mapping[str, Any], *, repetitions: int = 100, see
     repetitions
         How often the best candidate is simulated and fitted: 0, or 10 and more.
     """
+    names: dict[str, str] = {}
     with tempfile.TemporaryDirectory() as folder:
         if isinstance(problem, Mapping):
             file = Path(folder) / "design.json"
             file.write_text(json_text(problem, "design"), encoding="utf-8")
             problem = file
-        return Design(_program.answer(["design", os.fspath(problem), "--repetitions", str(repetitions), "--seed", str(seed)]))
+            names[str(file)] = "design"
+        words = ["design", os.fspath(problem), "--repetitions", str(repetitions), "--seed", str(seed)]
+        try:
+            return Design(renamed(_program.answer(words), names))
+        except _core.Error as error:
+            raise same_error(error, names) from None
 
 
 @told
@@ -213,6 +223,11 @@ def view(file: PathLike | Fit | Law, output: PathLike) -> Path:
 
     Returns the page. Raises tpmkit.Error, also where `output` is there already and not such a page.
     """
+    page = Path(output)
+    if page.is_file():
+        with page.open("rb") as there:
+            if b"<title>tpm view</title>" not in there.read(4096):
+                raise _core.ArgumentError(f"view: {page} is there already and is no page of tpm view; expected another name")
     with tempfile.TemporaryDirectory() as folder:
         if isinstance(file, Fit):
             file.save(folder)

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import functools
+import importlib
 import json
+import numbers
 import os
 from typing import Any, Callable, Mapping, TypeVar
 
@@ -11,12 +13,47 @@ from . import _core
 
 # What pybind11 and os.fspath() say of an argument of another kind.
 KINDS = ("incompatible function arguments", "incompatible constructor", "expected str, bytes or os.PathLike object")
+USAGE, BAD_INPUT, ENVIRONMENT = 2, 3, 5  # exit codes of the program, as Error.code
 Function = TypeVar("Function", bound=Callable[..., Any])
 
 
 def shown(value: Any) -> str:
-    """A value in a message; of what tpmkit made its name alone."""
-    return f"a {type(value).__name__}" if hasattr(value, "_core") else repr(value)[:40]
+    """A value in a message; of anything but a text, a number or a list of them the name of its type alone."""
+    if value is None or isinstance(value, (str, bytes, numbers.Number, os.PathLike, list, tuple, dict)):
+        text = repr(value)[:40]
+        if "\n" not in text:
+            return text
+    return f"a {type(value).__name__}"
+
+
+def of_arguments(function: Any) -> Any:
+    """A function of nothing but arguments: what it refuses of them is an ArgumentError."""
+
+    @functools.wraps(function)
+    def call(*arguments: Any, **named: Any) -> Any:
+        try:
+            return function(*arguments, **named)
+        except _core.ArgumentError:
+            raise
+        except _core.Error as error:
+            if error.code > BAD_INPUT:
+                raise
+            refusal = _core.ArgumentError(str(error))
+            refusal.code = error.code
+            raise refusal from None
+
+    return call
+
+
+def needed(module: str, where: str) -> Any:
+    """A module that only this call needs; raises tpmkit.Error in one sentence where it is not installed."""
+    try:
+        return importlib.import_module(module)
+    except ImportError as error:
+        name = module.partition(".")[0]
+        missing = _core.Error(f"{where}: Python cannot import {name} ({error}); expected it installed, as the Debian package python3-{name}")
+        missing.code = ENVIRONMENT
+        raise missing from None
 
 
 def json_text(document: Mapping[str, Any], where: str) -> str:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import functools
 import math
 import numbers
 import os
@@ -12,7 +11,7 @@ import numpy as np
 
 from . import _core
 from ._core import Protocol
-from ._kinds import json_text, told
+from ._kinds import json_text, of_arguments, shown, told
 
 if TYPE_CHECKING:
     import numpy.typing as npt
@@ -20,18 +19,37 @@ if TYPE_CHECKING:
     Array = npt.NDArray[np.float64]
 
 
-def times_of(times: npt.ArrayLike, name: str = "times_s") -> Array:
-    """A list of numbers, none of them NaN; raises tpmkit.ArgumentError in one sentence."""
+def numbers_of(where: str, values: Any) -> Array:
+    """A list of numbers, none of them missing; raises tpmkit.ArgumentError in one sentence."""
+    if isinstance(values, np.ma.MaskedArray) and np.ma.is_masked(values):
+        raise _core.ArgumentError(f"{where} is masked at place {np.flatnonzero(np.ma.getmaskarray(values))[0]}; expected numbers")
+    if hasattr(values, "magnitude") or hasattr(values, "unit"):  # of pint, of astropy
+        raise _core.ArgumentError(f"{where} is a {type(values).__name__} with a unit of its own; expected plain numbers")
     try:
-        array = np.ascontiguousarray(times, dtype=float)
+        array = np.asarray(values)
     except (TypeError, ValueError):
-        raise _core.ArgumentError(f"{name}: {times!r:.60}; expected a list of numbers") from None
+        raise _core.ArgumentError(f"{where} is {shown(values)}; expected a list of numbers") from None
+    if array.dtype.kind in "mM":
+        raise _core.ArgumentError(f'{where} holds {array.dtype}; expected numbers, such as (t - t[0]) / numpy.timedelta64(1, "s")')
+    if array.ndim == 0 and array.dtype.kind not in "iuf":
+        raise _core.ArgumentError(f"{where} is {shown(values)}; expected a list of numbers")
+    if array.dtype.kind not in "iufO":
+        raise _core.ArgumentError(f"{where} holds {array.dtype}; expected numbers")
+    try:
+        array = np.ascontiguousarray(array, dtype=float)
+    except (TypeError, ValueError, OverflowError):
+        raise _core.ArgumentError(f"{where} is {shown(values)}; expected a list of numbers") from None
     if array.ndim != 1:
-        raise _core.ArgumentError(f"{name}: has the shape {array.shape}; expected a list of numbers")
+        raise _core.ArgumentError(f"{where} has the shape {array.shape}; expected a list of numbers")
     bad = np.flatnonzero(np.isnan(array))
     if bad.size:
-        raise _core.ArgumentError(f"{name}: is NaN at place {bad[0]}; expected numbers")
+        raise _core.ArgumentError(f"{where} is NaN at place {bad[0]}; expected numbers")
     return array
+
+
+def times_of(times: npt.ArrayLike, name: str = "times_s") -> Array:
+    """A list of numbers, none of them NaN; raises tpmkit.ArgumentError in one sentence."""
+    return numbers_of(f"{name}:", times)
 
 
 def number_of(where: str, name: str, value: Any) -> float:
@@ -41,28 +59,11 @@ def number_of(where: str, name: str, value: Any) -> float:
     return float(value)
 
 
-def _of_arguments(function: Any) -> Any:
-    """A compiled function of nothing but arguments: what it refuses is an ArgumentError."""
-
-    @functools.wraps(function)
-    def call(*arguments: Any, **named: Any) -> Any:
-        try:
-            return function(*arguments, **named)
-        except _core.ArgumentError:
-            raise
-        except _core.Error as error:
-            refusal = _core.ArgumentError(str(error))
-            refusal.code = error.code
-            raise refusal from None
-
-    return call
-
-
 def _told_protocols() -> None:
     """Gives the ways to make a Protocol, which are compiled, messages without types of C++, and histories one dimension."""
     for name in ("step_and_hold", "ramp_and_hold", "creep"):
-        setattr(Protocol, name, staticmethod(told(_of_arguments(getattr(Protocol, name)), f"Protocol.{name}")))
-    compiled = _of_arguments(Protocol.history)
+        setattr(Protocol, name, staticmethod(told(of_arguments(getattr(Protocol, name)), f"Protocol.{name}")))
+    compiled, value, scaled = of_arguments(Protocol.history), Protocol.value_at, Protocol.scaled
 
     def history(
         times_s: npt.ArrayLike, values: npt.ArrayLike, drive: str = "displacement", equilibrium_at_start: bool = False
@@ -71,7 +72,21 @@ def _told_protocols() -> None:
         equilibrium_at_start: the first value had been kept for ever before."""
         return compiled(times_of(times_s), times_of(values, "values"), drive, equilibrium_at_start)
 
+    def value_at(self: Protocol, time_s: float) -> float:
+        """The imposed value at a time (s); at a jump the one after it."""
+        return value(self, times_of([time_s], "time_s")[0])
+
+    def scaled_by(self: Protocol, factor: float) -> Protocol:
+        """The same history with every value times a factor, which is finite."""
+        return scaled(self, number_of("scaled", "factor", factor))
+
+    def no_constructor(self: Protocol, *arguments: Any, **named: Any) -> None:
+        raise _core.ArgumentError("Protocol: is not made by its name; expected Protocol.step_and_hold, ramp_and_hold, creep or history")
+
     Protocol.history = staticmethod(told(history, "Protocol.history"))  # type: ignore[method-assign]
+    Protocol.value_at = value_at  # type: ignore[method-assign]
+    Protocol.scaled = scaled_by  # type: ignore[method-assign]
+    Protocol.__init__ = no_constructor  # type: ignore[method-assign]
 
 
 _told_protocols()
@@ -82,8 +97,8 @@ def _with_units(law: str, parameters: Mapping[str, float]) -> dict[str, float]:
     try:
         given = dict(parameters)
     except (TypeError, ValueError):
-        raise _core.Error(f'law: parameters are {parameters!r:.60}; expected them by name: {{"k_inf": 60.0, ...}}, SI') from None
-    known = [key for key, _, _ in _core.law_parameters(law)]
+        raise _core.ArgumentError(f'law: parameters are {shown(parameters)}; expected them by name: {{"k_inf": 60.0, ...}}, SI') from None
+    known = [key for key, _, _ in of_arguments(_core.law_parameters)(law)]
     named: dict[str, float] = {}
     for name, value in given.items():
         meant = [key for key in known if key.startswith(f"{name}_")]
@@ -120,7 +135,7 @@ class Law:
 
     Raises
     ------
-    tpmkit.Error
+    tpmkit.ArgumentError
         An unknown law, a missing or unknown parameter, a value out of range.
     """
 
@@ -146,7 +161,7 @@ class Law:
             "parameters": _with_units(name, parameters),
             "provenance": provenance,
         }
-        self._core = _core.Law.from_json(json_text(document, "law"))
+        self._core = of_arguments(_core.Law.from_json)(json_text(document, "law"))
 
     @classmethod
     def _of(cls, core: _core.Law) -> Law:
@@ -177,7 +192,7 @@ class Law:
     @told
     def describe(name: str) -> dict[str, tuple[str, str]]:
         """Parameters of a law: name to (SI unit, meaning)."""
-        return {key: (unit, meaning) for key, unit, meaning in _core.law_parameters(name)}
+        return {key: (unit, meaning) for key, unit, meaning in of_arguments(_core.law_parameters)(name)}
 
     @told
     def write(self, path: str | os.PathLike[str]) -> None:
@@ -230,12 +245,12 @@ class Law:
         `sensitivity` the answer is (values, derivatives): n times by n parameters, in the order of
         `parameters`, SI over SI. A value that the law does not predict is NaN.
         """
-        return self._core.respond(protocol, times_of(times_s), sensitivity)
+        return of_arguments(self._core.respond)(protocol, times_of(times_s), sensitivity)
 
     @told
     def respond_spectrum(self, frequency_Hz: npt.ArrayLike) -> tuple[Array, Array]:
         """Storage and loss at given frequencies, about the reference depth; N/m, or Pa for a strip."""
-        return self._core.respond_spectrum(times_of(frequency_Hz, "frequency_Hz"))
+        return of_arguments(self._core.respond_spectrum)(times_of(frequency_Hz, "frequency_Hz"))
 
     def __repr__(self) -> str:
         return repr(self._core)
@@ -301,7 +316,7 @@ class Element:
         """The response at given times; see `Law.respond`. Derivatives are by E1, E2, E', eta1, x, A0, l0."""
         times = times_of(times_s)
         values = list(self.parameters.values())
-        return _core.respond_element(values, self.formulation, protocol, times, sensitivity)
+        return of_arguments(_core.respond_element)(values, self.formulation, protocol, times, sensitivity)
 
     def __repr__(self) -> str:
         return "<tpmkit.Element " + ", ".join(f"{k}={v:g}" for k, v in self.parameters.items()) + ">"

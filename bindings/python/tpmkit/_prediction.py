@@ -1,4 +1,4 @@
-"""The answer of `Fit.predict`."""
+"""The answers of `Fit.predict` and `Fit.young_moduli`."""
 
 from __future__ import annotations
 
@@ -9,9 +9,9 @@ import pandas as pd
 
 
 class Prediction(pd.DataFrame):
-    """What a fitted law answers, by time_s: value and standard_error; `warnings` are those of `tpm predict`.
+    """A table that follows from a fit: of `Fit.predict` value and standard_error by time_s, of `Fit.young_moduli` the moduli.
 
-    It is a DataFrame whose `attrs` hold the warnings; parts of it keep them.
+    It is a DataFrame whose `attrs` hold adequacy and warnings; parts of it keep them.
     """
 
     @property
@@ -24,9 +24,18 @@ class Prediction(pd.DataFrame):
         against the law."""
         return self.attrs.get("warnings", [])
 
+    @property
+    def adequacy(self) -> dict[str, Any] | None:
+        """Whether the law describes the data that it was fitted to, as `Fit.adequacy`; None in a table made of others."""
+        return self.attrs.get("adequacy")
+
+    def _remarks_shown(self) -> list[str]:
+        adequacy = self.adequacy["summary"] if self.adequacy else "not known"
+        return [f"adequacy: {adequacy}", *(f"warning: {w}" for w in self.warnings if w != adequacy)]
+
     def __repr__(self) -> str:
-        return "\n".join([super().__repr__(), *(f"warning: {w}" for w in self.warnings)])
+        return "\n".join([super().__repr__(), *self._remarks_shown()])
 
     def _repr_html_(self) -> Any:
         table = super()._repr_html_()  # type: ignore[operator]
-        return table and table + "".join(f"<p>warning: {html.escape(w)}</p>" for w in self.warnings)
+        return table and table + "".join(f"<p>{html.escape(words)}</p>" for words in self._remarks_shown())

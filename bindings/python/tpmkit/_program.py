@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Any, Sequence
 
 from . import _core
+from ._kinds import USAGE
 
 
 def found() -> str | None:
@@ -34,7 +35,7 @@ def _program() -> str:
 
 
 def _error(text: str, code: int) -> _core.Error:
-    error = _core.Error(text)
+    error = (_core.ArgumentError if code == USAGE else _core.Error)(text)
     error.code = code
     return error
 

@@ -246,6 +246,10 @@ def plan(
             raise _core.ArgumentError(f"plan: {name} is {value!r}; expected {wanted}")
     if rate_Hz is not None and (isinstance(rate_Hz, bool) or not isinstance(rate_Hz, numbers.Real)):
         raise _core.ArgumentError(f"plan: rate_Hz is {rate_Hz!r}; expected a number, in Hz")
+    if outputs not in ("force", "field"):
+        raise _core.ArgumentError(f'plan: outputs is {outputs!r:.60}; expected "force" or "field"')
+    if rate_Hz is not None and not 1.0 <= rate_Hz <= 1e6:
+        raise _core.ArgumentError(f"plan: rate_Hz is {rate_Hz!r}; expected a servo rate of 1 to 1e6, in Hz")
     text, where, folder = scene_text(scene)
     with shown(progress, "planning") as told:
         return Plan(*_core.plan(text, where, folder, tolerance, outputs, rate_Hz, wall, os.fspath(costs), told))

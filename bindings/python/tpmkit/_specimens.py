@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
@@ -79,7 +80,9 @@ class Specimens:
 
     def __repr__(self) -> str:
         lines = [f"<tpmkit.Specimens {self.law}, {len(self.recordings)} recordings"]
-        lines += [f"  {name}: {row['summary']}" for name, row in self.pooled.iterrows()]
+        for name, row in self.pooled.iterrows():
+            interval = " .. ".join("open" if math.isnan(v) else f"{v:.4g}" for v in (row["lower"], row["upper"]))
+            lines.append(f"  {name} {row['typical']:.5g} ({interval}) {row['unit']}: {row['summary']}")
         lines.append(f"  adequacy: {self.adequacy['summary']}")
         lines += [f"  warning: {w}" for w in self.warnings]
         return "\n".join(lines) + ">"

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import numbers
 import tempfile
 from collections.abc import Callable, Mapping
 from pathlib import Path
@@ -10,10 +11,16 @@ from typing import TYPE_CHECKING, Any, TypeVar
 import numpy as np
 
 from . import _core
+from ._kinds import shown
+from ._law import numbers_of
 
 if TYPE_CHECKING:
     import pandas as pd
 
+# What `columns` may say: the options of reading of the program, and where a recording comes from.
+KEYS = ("encoding", "separator", "decimal", "thousands", "header_rows", "block", "time", "drive", "response", "sd", "frequency",
+        "storage", "loss", "drive_quantity", "response_quantity", "negate_drive", "negate_response", "step_time", "from", "until",
+        "rest_length", "area", "spring_constant", "deflection_sensitivity", "segments", "units", "provenance")
 TABLE = "table"  # what messages and answers call a recording in memory
 Answer = TypeVar("Answer")
 
@@ -39,10 +46,25 @@ def reading_of(where: str, columns: Mapping[str, Any] | None, units: Mapping[str
     """`columns` of a call as a dict, with the units of columns by name among them."""
     for name, value in (("columns", columns), ("units", units)):
         if value is not None and not isinstance(value, Mapping):
-            raise _core.ArgumentError(f"{where}: {name} is {value!r:.60}; expected a dict")
+            raise _core.ArgumentError(f"{where}: {name} is {shown(value)}; expected a dict")
     reading = dict(columns or {})
-    if units:
-        reading["units"] = {**reading.get("units", {}), **units}
+    unknown = [key for key in reading if key not in KEYS]
+    if unknown:
+        raise _core.ArgumentError(f"{where}: columns names {shown(unknown[0])}; expected keys of {', '.join(KEYS)}")
+    said = reading.get("units", {})
+    if not isinstance(said, Mapping):
+        raise _core.ArgumentError(f'{where}: units is {shown(said)}; expected a dict such as {{"force": "mN"}}')
+    if units or "units" in reading:
+        reading["units"] = {**said, **(units or {})}
+    for column, unit in reading.get("units", {}).items():
+        if not isinstance(column, str) or not isinstance(unit, str):
+            raise _core.ArgumentError(f'{where}: units has {shown(column)}: {shown(unit)}; expected two texts, such as "force": "mN"')
+    segments = reading.get("segments")
+    if segments is not None and (isinstance(segments, str) or not all(isinstance(s, str) for s in segments)):
+        raise _core.ArgumentError(f"{where}: segments is {shown(segments)}; expected a list of texts")
+    for key, value in reading.items():
+        if key not in ("units", "segments") and not isinstance(value, (str, numbers.Real)):
+            raise _core.ArgumentError(f"{where}: {key} is {shown(value)}; expected a text, a number or True")
     return reading
 
 
@@ -65,11 +87,17 @@ def csv_of(where: str, table: Any) -> str:
             table.index.name = None
     if not isinstance(table, pd.DataFrame):
         raise _core.ArgumentError(f"{where}: a {type(table).__name__}; expected a DataFrame with columns of times, depths and forces")
+    if table.empty:
+        raise _core.ArgumentError(f"{where}: the table has {len(table)} rows and {len(table.columns)} columns; expected times, depths and forces")
     index = table.index
     if any(name is not None for name in index.names):
         table = table.reset_index()
     elif index.nlevels > 1 or not pd.api.types.is_integer_dtype(index.dtype):
-        raise _core.ArgumentError(f"{where}: the table's index has no name; expected frame.reset_index(drop=True), or a name with a unit")
+        raise _core.ArgumentError(f"{where}: the table's index has no name; expected "
+                                  'frame.rename_axis("time (s)") to read it, or frame.reset_index(drop=True) to leave it out')
+    for name, column in table.items():
+        if column.dtype.kind == "m":
+            raise _core.ArgumentError(f"{where}: {name} holds {column.dtype}; expected numbers, such as its .dt.total_seconds()")
     return table.to_csv(index=False)
 
 
@@ -80,27 +108,19 @@ def frame_of(where: str, arrays: Mapping[str, Any], units: Mapping[str, str] | N
     missing = [name for name, values in arrays.items() if values is None]
     if missing:
         raise _core.ArgumentError(f"{where}: {' and '.join(missing)} missing; expected {', '.join(arrays)} together")
-    if set(units or {}) != set(arrays):
+    if not isinstance(units, Mapping) or set(units) != set(arrays):
         raise _core.ArgumentError(f"{where}: units are not guessed; expected units="
                                   '{"time": "s", "depth": "mm", "force": "mN"}, one for each')
     columns: dict[str, Any] = {}
     for name, values in arrays.items():
-        array = np.asarray(values)
-        if array.ndim != 1:
-            raise _core.ArgumentError(f"{where}: {name} has the shape {array.shape}; expected a list of numbers")
+        own = getattr(values, "attrs", {}).get("units")  # of an array of xarray
+        if own is not None and own != units[name]:
+            raise _core.ArgumentError(f"{where}: {name} is in {own} and units says {units[name]}; expected the same")
+        array = numbers_of(f"{where}: {name}", values)
         if columns and array.size != len(next(iter(columns.values()))):
             first = next(iter(arrays))
             raise _core.ArgumentError(f"{where}: {name} has {array.size} values and {first} "
                                       f"{len(next(iter(columns.values())))}; expected as many of each")
-        if array.dtype.kind in "mM":
-            raise _core.ArgumentError(f"{where}: {name} holds {array.dtype}; expected numbers, such as "
-                                      '(t - t[0]) / numpy.timedelta64(1, "s")')
-        if array.dtype.kind not in "iufO":
-            raise _core.ArgumentError(f"{where}: {name} holds {array.dtype}; expected numbers")
-        try:
-            array = array.astype(float)
-        except (TypeError, ValueError):
-            raise _core.ArgumentError(f"{where}: {name} holds {array.dtype}; expected numbers") from None
         bad = np.flatnonzero(~np.isfinite(array))
         if bad.size:
             raise _core.ArgumentError(f"{where}: {name} is {array[bad[0]]} at place {bad[0]}; expected finite numbers")

@@ -90,7 +90,7 @@ std::string ColumnChoice::list() const {
 
 const MachineColumn& ColumnChoice::by_selector(const std::string& selector) const {
   for (const MachineColumn& column : header_.columns) {
-    if (column.name == selector) return column;
+    if (selector == column.name || selector == column.title) return column;
   }
   for (const MachineColumn& column : header_.columns) {
     if (column.has_number(selector)) return column;
@@ -99,6 +99,18 @@ const MachineColumn& ColumnChoice::by_selector(const std::string& selector) cons
   throw bad_input(
       file_, fmt::format("no column '{}'{}", printable(selector), did_you_mean(selector, names)),
       list());
+}
+
+void ColumnChoice::require_column_for_unit(const std::string& selector) const {
+  const bool named =
+      std::any_of(header_.columns.begin(), header_.columns.end(),
+                  [&selector](const MachineColumn& column) { return column.is_named(selector); });
+  if (named) return;
+  const auto names = mapped<std::string>(header_.columns, &MachineColumn::name);
+  throw bad_input(file_,
+                  fmt::format("no column '{}', which --unit names{}", printable(selector),
+                              did_you_mean(selector, names)),
+                  list());
 }
 
 /// Up to rounding, in SI.

@@ -17,7 +17,7 @@ class ColumnChoice {
   /// All are kept as references.
   ColumnChoice(const DelimitedTable& table, const MachineHeader& header, const std::string& file);
 
-  /// @param selector  name or number from 1 of the column, or empty
+  /// @param selector  name, whole title or number from 1 of the column, or empty
   /// @param option    that chooses such a column, "--time"
   /// Null if none fits. Throws Error(bad_input) for a selector without a column.
   [[nodiscard]] const MachineColumn* find(ColumnRole role, const std::string& selector,
@@ -30,6 +30,9 @@ class ColumnChoice {
 
   /// A column of what was asked for in this role; null if there is none.
   [[nodiscard]] const MachineColumn* refused(ColumnRole role) const;
+
+  /// Throws Error(bad_input) if no column has this name or number, whose unit the user says.
+  void require_column_for_unit(const std::string& selector) const;
 
   /// "column 1 'Time', column 2 'Force'"
   [[nodiscard]] std::string list() const;

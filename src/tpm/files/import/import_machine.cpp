@@ -375,6 +375,7 @@ ImportedSeries read_machine(const DelimitedTable& table, const std::string& file
                             const ImportOptions& options) {
   const MachineHeader header = read_machine_header(table, file, options);
   const ColumnChoice choice(table, header, file);
+  for (const auto& [selector, unit] : options.units) choice.require_column_for_unit(selector);
   std::vector<Use> uses = spectrum_uses(choice, file, options);
   const bool spectrum = !uses.empty();
   if (!spectrum) uses = recording_uses(table, header, choice, file, options);

@@ -6,6 +6,8 @@
 #include <array>
 #include <cctype>
 
+#include "tpm/base/namespaces.hpp"
+#include "tpm/base/text.hpp"
 #include "tpm/files/import/column_title.hpp"
 #include "tpm/files/import/machine_columns.hpp"
 #include "tpm/files/unit_words.hpp"
@@ -16,6 +18,10 @@ namespace tpm::files {
 std::string MachineColumn::label() const {
   return name.empty() ? fmt::format("column {}", index + 1)
                       : fmt::format("column {} '{}'", index + 1, printable(name));
+}
+
+bool MachineColumn::is_named(std::string_view selector) const {
+  return selector == name || selector == title || has_number(selector);
 }
 
 bool MachineColumn::has_number(std::string_view selector) const {
@@ -89,7 +95,7 @@ std::string sheet_name(const HeaderRow& row) {
 /// Units given by name or number go before those of the file.
 std::string chosen_unit(const MachineColumn& column, const ImportOptions& options) {
   for (const auto& [selector, unit] : options.units) {
-    if (selector == column.name || column.has_number(selector)) return unit;
+    if (column.is_named(selector)) return unit;
   }
   return column.unit;
 }
@@ -201,11 +207,12 @@ MachineColumn described_column(std::size_t index, const HeaderRows& rows,
   MachineColumn column{
       index, title.name, unit.empty() ? title.unit : unit, recognize_title(title.name), {}, false,
       false, {}};
+  column.title = trimmed(cell_or_empty(rows.titles, index));
   column.refused = refused_title(title.name);
   const std::string chosen = chosen_unit(column, options);
   column.unit_is_chosen = chosen != column.unit;
   for (const auto& [selector, said] : options.units) {
-    column.unit_is_chosen |= selector == column.name || column.has_number(selector);
+    column.unit_is_chosen |= column.is_named(selector);
   }
   column.unit = written_unit(chosen);
   const bool per_second = is_unit(column.unit) && parse_unit(column.unit, {}).symbol == "Hz" &&

@@ -22,6 +22,10 @@ struct MachineColumn {
   bool misfit = false;  ///< the unit is none of what the title says: taken if no other column fits
   bool unit_is_chosen = false;                  ///< by the options, not by the file
   std::vector<std::string> unit_readings = {};  ///< of a unit that is two: "MPA" is mPa or MPa
+  std::string title = {};  ///< as the file writes it, with its unit: "Force (N)"
+
+  /// True if an option means this column: by its name, its title as it stands, or its number.
+  [[nodiscard]] bool is_named(std::string_view selector) const;
 
   /// "column 2 'Force'"
   [[nodiscard]] std::string label() const;
