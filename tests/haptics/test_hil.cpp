@@ -14,6 +14,7 @@
 #include "tpm/haptics/show/hil_report.hpp"
 #include "tpm/haptics/verify/verify.hpp"
 #include "tpmkit/error.hpp"
+#include "tpmkit/version.hpp"
 
 namespace tpm::haptics {
 namespace {

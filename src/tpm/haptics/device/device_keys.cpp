@@ -6,6 +6,7 @@
 
 #include "tpm/base/enum_names.hpp"
 #include "tpm/base/text.hpp"
+#include "tpm/files/keys/more_types.hpp"
 #include "tpm/haptics/device/device_limits.hpp"
 
 namespace tpm::haptics {
