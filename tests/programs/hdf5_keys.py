@@ -29,6 +29,8 @@ SWEEP = {"model": "single_contact", "material": STAR["material"], "indentation":
 # Names that no JSON has, each with its reason.
 OTHERS = {
     "scene": "the text of the scene, which its JSON does not repeat",
+    "meaning": "of a column or a group, in words; a key of `tpm sweep show`",
+    "drive_key": "which packed column is imposed, as in Python", "response_key": "likewise",
     "quantity": "of a column of a packed curve", "missing": "how a packed column says that there is no value",
     "sweep_json": "the text of the sweep", "sweep_fingerprint": "by which a sweep finds its own file again",
     "units": "the name that the CF conventions and xarray prescribe", "long_name": "likewise",
