@@ -82,8 +82,8 @@ std::string identified_text(const IdentifyRun& run) {
   for (const DeviceFinding& finding : run.findings) {
     text += "the device noticed: " + finding.text + "\n";
   }
-  for (const std::string& line : f.not_identified) {
-    text += fmt::format("not identified: {}\n", line);
+  for (const Remark& remark : f.not_identified) {
+    text += fmt::format("not identified: {}\n", remark.text);
   }
   return text;
 }

@@ -126,7 +126,7 @@ int print_results(const Sweep& sweep, const CellTally& tally, const std::vector<
     text += fmt::format("- {}\n", printable(tally.reasons[i], 160));
   }
   if (tally.reasons.size() > kShown) {
-    text += fmt::format("- and {} more reasons: /reason_text\n", tally.reasons.size() - kShown);
+    text += fmt::format("- and {} more reasons: /reasons\n", tally.reasons.size() - kShown);
   }
   say_with_files(session, tally_json(sweep, tally), text, files);
   return exit_code(tally.done > 0 || tally.failed == 0);

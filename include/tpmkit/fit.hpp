@@ -48,8 +48,8 @@ struct FittedParameter {
   /// interval, too.
   std::optional<WithDrift> with_drift = std::nullopt;
   /// Why the minimum itself is not trusted ("found by one start of 5", and what to do); the
-  /// parameter is then not identified, whatever the verdict. Empty: nothing.
-  std::string unconfirmed;
+  /// parameter is then not identified, whatever the verdict.
+  std::optional<Remark> unconfirmed;
   std::string summary;  ///< the verdict as a sentence
 };
 

@@ -6,6 +6,7 @@
 #include <string_view>
 #include <vector>
 
+#include "tpmkit/error.hpp"
 #include "tpmkit/law.hpp"
 
 namespace tpm {
@@ -86,7 +87,7 @@ struct LawAdequacy {
   std::string verdict;                        ///< adequate, not_described or not_judged
   std::optional<double> residual_over_noise;  ///< of the worst recording; none if not judged
   std::string summary;                        ///< one sentence, with the likely cause
-  std::vector<std::string> causes = {};       ///< likely ones, if the law does not describe them
+  std::vector<Remark> causes = {};            ///< likely ones, if the law does not describe them
 
   [[nodiscard]] bool is_adequate() const { return verdict == "adequate"; }
   [[nodiscard]] bool is_rejected() const { return verdict == "not_described"; }

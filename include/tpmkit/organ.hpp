@@ -6,6 +6,8 @@
 #include <string_view>
 #include <vector>
 
+#include "tpmkit/error.hpp"
+
 namespace tpm::organ {
 
 /// One column per sphere, m.
@@ -23,8 +25,7 @@ struct Organ {
   double radius = 0.0;                 ///< of each sphere, m
   double spacing = 0.0;                ///< x, nominal distance between neighbours, m
   std::optional<std::size_t> contact;  ///< the sphere that the probe meets, if one is chosen
-  /// Assumptions of the shape, one sentence each ("coordinates are in metres").
-  std::vector<std::string> assumptions;
+  std::vector<Remark> assumptions;     ///< of the shape ("coordinates are in metres")
 
   [[nodiscard]] std::size_t size() const { return static_cast<std::size_t>(position.cols()); }
   [[nodiscard]] int layer_count() const;

@@ -286,13 +286,13 @@ TEST_CASE("packed curves are checked like files of text") {
   CHECK(answer(recording) == "taken");
   Recording wrong = recording;
   wrong.response[1] = std::nan("");
-  CHECK_THAT(answer(wrong), Catch::Contains("/curves/r: response 1: not a number"));
+  CHECK_THAT(answer(wrong), Catch::Contains("/curves/r: force_N 1: not a number"));
   wrong = recording;
   wrong.time_s[2] = 0.1;
-  CHECK_THAT(answer(wrong), Catch::Contains("time 2: time 0.1 s does not follow 0.1 s"));
+  CHECK_THAT(answer(wrong), Catch::Contains("time_s 2: time 0.1 s does not follow 0.1 s"));
   wrong = recording;
   wrong.response_sd = {0.1, -0.1, 0.1};
-  CHECK_THAT(answer(wrong), Catch::Contains("response_sd 1: -0.1 is negative"));
+  CHECK_THAT(answer(wrong), Catch::Contains("force_sd_N 1: -0.1 is negative"));
   PointSet points = std::get<PointSet>(load_curve("evren_static"));
   CHECK(answer(points) == "taken");
   points.data[1].depth_m = -1e-3;

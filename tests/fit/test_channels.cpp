@@ -86,7 +86,8 @@ TEST_CASE("a channel that is late is named, with its time", "[channels]") {
   const LawAdequacy filtered = adequacy_with(ChannelFault::response_filtered, 0.3);
   CHECK(filtered.is_rejected());
   REQUIRE(filtered.causes.size() == 1);
-  CHECK_THAT(filtered.causes.front(),
+  CHECK(filtered.causes.front().code == "late_channel");
+  CHECK_THAT(filtered.causes.front().text,
              Contains("the force follows late, as behind a filter with a time constant of 0.3 s"));
 }
 

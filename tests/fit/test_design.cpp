@@ -234,7 +234,8 @@ TEST_CASE("the paper's element and creep are planned through the same interface"
   CHECK(result.ranked.front().experiment.load_N == 0.2);
   CHECK(result.ranked.front().expected.all_identified());
   REQUIRE(result.left_out.size() == 1);
-  CHECK_THAT(result.left_out.front(), Contains("1 of 2: the load presses deeper than 12 mm"));
+  CHECK(result.left_out.front().code == "depth_under_load");
+  CHECK_THAT(result.left_out.front().text, Contains("1 of 2: the load presses deeper than 12 mm"));
 }
 
 TEST_CASE("correlated noise thins the samples") {

@@ -303,9 +303,9 @@ TEST_CASE("A measurement goes on after a lost connection, and says so") {
   REQUIRE(part.found.delay_mean_s);
   CHECK_THAT(*part.found.delay_mean_s, WithinAbs(1e-3 * kLate_ms, 0.5e-3 + 1e-9));
   REQUIRE_FALSE(part.found.not_identified.empty());
-  CHECK_THAT(part.found.not_identified.back(), Contains("everything after ") &&
-                                                   Contains("does not open again: ") &&
-                                                   Contains("the service is silent"));
+  CHECK_THAT(part.found.not_identified.back().text, Contains("everything after ") &&
+                                                        Contains("does not open again: ") &&
+                                                        Contains("the service is silent"));
 }
 
 /// A session, message by message, on a service that goes wrong.

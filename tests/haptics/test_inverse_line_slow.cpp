@@ -22,10 +22,9 @@ bool is_of_a_stall(const std::string& end) {
   return std::find(kEnds.begin(), kEnds.end(), end) != kEnds.end();
 }
 
-bool names_a_stall(const std::vector<std::string>& lines) {
-  return std::any_of(lines.begin(), lines.end(), [](const std::string& line) {
-    return line.find("stalled") != std::string::npos ||
-           line.find("everything after ") != std::string::npos;
+bool names_a_stall(const std::vector<std::string>& codes) {
+  return std::ranges::any_of(codes, [](const std::string& code) {
+    return code.starts_with("stalled") || code == "ended";
   });
 }
 

@@ -121,18 +121,18 @@ TEST_CASE("the sum for two spring-pots keeps its stated error over the window", 
         for (const double t : decades(t_min, span * t_min, 14)) {
           CAPTURE(o.alpha, o.beta, tau, t);
           const PairValue exact = pair_relaxation(o.alpha, o.beta, t / tau);
-          const double off = std::abs(exponentials.at(w, t) - pair_modulus(o, t / tau));
-          const double mean = exponentials.integral_s(w, t) / t - pair_mean(o, t / tau);
+          const double off = std::abs(sum_at(exponentials, w, t) - pair_modulus(o, t / tau));
+          const double mean = sum_integral_s(exponentials, w, t) / t - pair_mean(o, t / tau);
           if (std::max(off, std::abs(mean)) > 1e-10 * scale) {
             FAIL_CHECK(off / scale << " " << mean / scale);
           }
           worst = std::max({worst, off / scale, std::abs(mean) / scale});
           // derivatives are of the size of G and of G ln(t/tau)
           const double steep = scale * (1.0 + std::abs(std::log(t_min / tau)));
-          worst_slope = std::max({worst_slope,
-                                  std::abs(exponentials.at(by_alpha(w), t) - exact.d_alpha) / steep,
-                                  std::abs(exponentials.at(by_beta(w), t) - exact.d_beta) / steep,
-                                  std::abs(exponentials.at(by_log_tau(w), t) - exact.d_x) / steep});
+          worst_slope = std::max(
+              {worst_slope, std::abs(sum_at(exponentials, by_alpha(w), t) - exact.d_alpha) / steep,
+               std::abs(sum_at(exponentials, by_beta(w), t) - exact.d_beta) / steep,
+               std::abs(sum_at(exponentials, by_log_tau(w), t) - exact.d_x) / steep});
         }
       }
     }

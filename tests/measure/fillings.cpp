@@ -165,10 +165,8 @@ void measure(std::size_t from, std::size_t to, const std::array<Eigen::Vector3d,
         fewest = std::min(fewest, stiffness.spheres);
         most = std::max(most, stiffness.spheres);
       }
-      const std::string added =
-          organ.assumptions.size() > 2
-              ? organ.assumptions.back().substr(0, organ.assumptions.back().find(' '))
-              : "0";
+      const std::string& last = organ.assumptions.back().text;
+      const std::string added = organ.assumptions.size() > 2 ? last.substr(0, last.find(' ')) : "0";
       fmt::print("| {} | {} | {} | {} | {:.2f} | {} | {} | {} to {} | {:.2f} | {:.2f} |\n",
                  entry_of(kLatticeWords, lattice).text, organ.size(), support.size(), added,
                  *std::min_element(support.begin(), support.end()), spread(single), spread(patch),

@@ -36,9 +36,10 @@ void add_mittag_leffler_errors(const ExponentialSum& exponentials, const Fractio
   const FractionalWeights slopes = by_log_tau(w);
   for (const double t : decades(1.0, span, 31)) {
     const auto raise = [](double& most, double error) { most = std::max(most, std::abs(error)); };
-    raise(worst.mittag_leffler, exponentials.at(w, t) - relaxation(alpha, tau, t));
-    raise(worst.slope, exponentials.at(slopes, t) - relaxation_by_log_tau(alpha, tau, t));
-    raise(worst.integral, (exponentials.integral_s(w, t) - relaxation_integral(alpha, tau, t)) / t);
+    raise(worst.mittag_leffler, sum_at(exponentials, w, t) - relaxation(alpha, tau, t));
+    raise(worst.slope, sum_at(exponentials, slopes, t) - relaxation_by_log_tau(alpha, tau, t));
+    raise(worst.integral,
+          (sum_integral_s(exponentials, w, t) - relaxation_integral(alpha, tau, t)) / t);
   }
 }
 
@@ -56,7 +57,7 @@ SumErrors sum_errors(const ExponentialSum& exponentials, double span) {
     exponentials.springpot(alpha, w);
     for (const double t : decades(1.0, span, 31)) {
       const double error =
-          std::abs(exponentials.at(w, t) - springpot(alpha, t)) / springpot(alpha, 1.0);
+          std::abs(sum_at(exponentials, w, t) - springpot(alpha, t)) / springpot(alpha, 1.0);
       worst.springpot = std::max(worst.springpot, error);
     }
   }

@@ -282,10 +282,9 @@ TEST_CASE("the inside of a block of cells has the moduli of its lattice in close
 
 TEST_CASE("a scene that states neither E nor a spacing law is told which law it has") {
   const auto told = [](const Json& json) {
-    for (const std::string& words : parse_tissue(json, "scene", {}).network.organ.assumptions) {
-      if (words.find("spacing law") != std::string::npos) return true;
-    }
-    return false;
+    return std::ranges::any_of(
+        parse_tissue(json, "scene", {}).network.organ.assumptions,
+        [](const Remark& assumption) { return assumption.code == "spacing_law_paper"; });
   };
   Json json = block_scene();
   CHECK(told(json));

@@ -161,18 +161,19 @@ TEST_CASE("what stands behind the last triangle is left out, and that is said") 
   };
   const std::string binary = binary_stl(unit_cube());
   for (const std::size_t more : {1U, 49U, 50U, 1000U}) {
-    const auto said = fmt::format("{} bytes behind the last triangle were left out", more);
+    const Remark said{"bytes_left_out",
+                      fmt::format("{} bytes behind the last triangle were left out", more)};
     CHECK(notes(binary + std::string(more, '\0')) == std::vector{said});
     CHECK(notes("solid" + binary.substr(5) + std::string(more, 'x')) == std::vector{said});
   }
   const std::string text = ascii_stl(unit_cube());
   CHECK(notes(text + "made by hand\n") ==
-        std::vector<std::string>{"13 bytes behind the last solid were left out"});
+        std::vector<Remark>{{"bytes_left_out", "13 bytes behind the last solid were left out"}});
   CHECK(notes(text + std::string(1, '\x1a')) ==
-        std::vector<std::string>{"1 bytes behind the last solid were left out"});
-  CHECK(
-      notes(text.substr(0, text.rfind("endsolid"))) ==
-      std::vector<std::string>{"the last solid has no 'endsolid'; the file may have been cut off"});
+        std::vector<Remark>{{"bytes_left_out", "1 bytes behind the last solid were left out"}});
+  CHECK(notes(text.substr(0, text.rfind("endsolid"))) ==
+        std::vector<Remark>{
+            {"no_endsolid", "the last solid has no 'endsolid'; the file may have been cut off"}});
 }
 
 TEST_CASE("a damaged STL is refused with its line or byte") {
@@ -270,8 +271,8 @@ TEST_CASE("OBJ in its forms is read") {
   }
   const ClosedMesh noted = read_mm(write(folder, "m.obj", cube + "f 1 2\nf 3\n"));
   require_cube(noted, "faces of two corners");
-  CHECK(noted.notes ==
-        std::vector<std::string>{"2 faces of fewer than three corners were left out"});
+  CHECK(noted.notes == std::vector<Remark>{{"faces_left_out",
+                                            "2 faces of fewer than three corners were left out"}});
 }
 
 TEST_CASE("a damaged OBJ is refused with its line") {

@@ -150,7 +150,8 @@ TEST_CASE("a mesh that faces inwards is turned, and that is said") {
   TriangleMesh inverted = unit_cube();
   inverted.triangles.row(0).swap(inverted.triangles.row(1));
   const ClosedMesh result = closed_mesh(inverted, "m.stl");
-  CHECK(result.notes == std::vector<std::string>{"the triangles faced inwards and were turned"});
+  CHECK(result.notes ==
+        std::vector<Remark>{{"triangles_turned", "the triangles faced inwards and were turned"}});
   CHECK_THAT(mesh_volume(result.mesh), WithinRel(1.0, 1e-14));
   CHECK(closed_mesh(unit_cube(), "m.stl").notes.empty());
 }

@@ -303,7 +303,7 @@ TEST_CASE("a claim names its quantity, and what is not claimed stands beside it"
   write_planned_run(plan, scene, times, answer, folder / "p.h5");
   const Hdf5Reader file(folder / "p.h5");
   CHECK(file.attribute("/claim", "quantity") == "displacements of all spheres");
-  CHECK_THAT(file.numbers("/claim/verified_response_error").at(0),
+  CHECK_THAT(file.number_attribute("/", "verified_response_error"),
              WithinRel(*plan.chosen().verified_response_error, 1e-5));
   CHECK(file.numbers("/steps/time_s") == times);
 }
@@ -330,11 +330,10 @@ TEST_CASE("of masses that scene and reference leave out there is one number and 
   const std::vector<double> times{0.0, 0.3};
   const ExperimentScene scene = liver(ramp("3 mm", "10 mm/s"));
   write_planned_run(plan, scene, times, run_planned(plan, scene, times), folder / "p.h5");
-  CHECK(Hdf5Reader(folder / "p.h5").numbers("/claim/masses_left_out").at(0) ==
-        *plan.masses_left_out);
-  const Json remarks = Json::parse(Hdf5Reader(folder / "p.h5").attribute("/claim", "remarks"));
-  CHECK(remarks == remarks_json(plan_remarks(plan)));
-  CHECK(remarks.at(0).at("code") == "masses_left_out");
+  const Hdf5Reader file(folder / "p.h5");
+  CHECK(file.number_attribute("/", "masses_left_out") == *plan.masses_left_out);
+  CHECK(file.texts("/remarks/text") == remark_texts(plan_remarks(plan)));
+  CHECK(file.texts("/remarks/code").at(0) == "masses_left_out");
   const std::string page =
       view_simulation(folder / "p.h5", read_file(folder / "p.h5"), {}).description["facts"].dump();
   CHECK_THAT(page, Contains(words) && Contains("error at most"));

@@ -42,8 +42,8 @@ def main():
             assert told.returncode in (2, 3) and told.stderr.count("\n") == 1, told
         assert {p.name for p in folder.iterdir()} == {"s.json", "r.tpmrec", "r.h5"}
         with h5py.File(folder / "r.h5") as file:
-            assert file.attrs["simulated_device"] == "true" and "SIMULATED DEVICE" in file.attrs["device"]
-            assert file.attrs["recording_sha256"] == hashlib.sha256((folder / "r.tpmrec").read_bytes()).hexdigest()
+            assert file.attrs["simulated_device"] == 1 and file["header/device"].attrs["kind"] == "virtual"
+            assert file["inputs/sha256"].asstr()[0] == hashlib.sha256((folder / "r.tpmrec").read_bytes()).hexdigest()
             header = json.loads(file["header_json"][0])
             assert header["session"]["title"] == SESSION["title"] == file.attrs["title"]
             rows = {name: values[:] for name, values in file["rows"].items()}

@@ -40,11 +40,11 @@ def main():
         assert {p.name for p in folder.iterdir()} == {"s.json", "s.h5", "s.csv", "s.run.json"}
         with h5py.File(folder / "s.h5") as file:
             force = file["force"]
-            assert [d.label or d[0].name for d in force.dims] == ["/depth", "/x", "/tissue", "/force_time"], list(force.dims)
+            assert [d.label or d[0].name for d in force.dims] == ["/depth", "/x", "/tissue", "/force_time_s"], list(force.dims)
         with (folder / "s.csv").open() as file:
             rows = list(csv.DictReader(file))
         with xarray.open_dataset(folder / "s.h5", engine="h5netcdf") as data:
-            assert data.peak_force.dims == ("depth", "x", "tissue") and data.force.dims[-1] == "force_time"
+            assert data.peak_force.dims == ("depth", "x", "tissue") and data.force.dims[-1] == "force_time_s"
             assert data.E2.dims == ("tissue",) and data.peak_force.attrs["units"] == "N"
             # Eqs. 2, 15 and 16 by numpy's own broadcasting over the named dimensions.
             lambda1 = 2 * 12e3 * (1 - np.cos(np.arctan(data.depth / data.x)))
@@ -56,7 +56,7 @@ def main():
                 truth = truth.transpose(*found.dims)
                 assert np.allclose(found.where(kept, 0), truth.where(kept, 0), rtol=1e-12, atol=0)
                 assert bool(np.isnan(found.where(~kept)).all())
-            assert set(data.reason_text.values[data.reason.values[~kept.values]]) == {"too deep"}
+            assert set(data.reasons.values[data.reason.values[~kept.values]]) == {"too deep"}
             # The CSV: the same numbers, cell by cell.
             assert len(rows) == data.peak_force.size
             for row, value, status in zip(rows, data.peak_force.values.ravel(), data.status.values.ravel()):

@@ -33,6 +33,24 @@ inline double springpot_integral(double alpha, double t) {
   return t > 0.0 ? std::pow(t, 1.0 - alpha) / std::tgamma(2.0 - alpha) : 0.0;
 }
 
+/// The sum of exponentials at a time > 0, and its integral from 0 on (with the dashpot).
+inline double sum_at(const ExponentialSum& sum, const FractionalWeights& weights, double t_s) {
+  double value = weights.constant;
+  for (std::size_t i = 0; i < sum.rates_per_s().size(); ++i) {
+    value += weights.weight[static_cast<Eigen::Index>(i)] * std::exp(-sum.rates_per_s()[i] * t_s);
+  }
+  return value;
+}
+inline double sum_integral_s(const ExponentialSum& sum, const FractionalWeights& weights,
+                             double t_s) {
+  double value = weights.dashpot_s + weights.constant * t_s;
+  for (std::size_t i = 0; i < sum.rates_per_s().size(); ++i) {
+    const double rate = sum.rates_per_s()[i];
+    value -= weights.weight[static_cast<Eigen::Index>(i)] * std::expm1(-rate * t_s) / rate;
+  }
+  return value;
+}
+
 /// n numbers from `low` to `high`, evenly on a logarithmic axis.
 inline std::vector<double> decades(double low, double high, int n) {
   std::vector<double> x(static_cast<std::size_t>(n));

@@ -162,7 +162,7 @@ inline void press(int port, const std::string& recording, const std::atomic<bool
 struct LineRun {
   int identified = -1, ran = -1, verified = -1;  ///< exit codes; -1: not asked
   std::optional<double> found_s, largest_s;
-  std::vector<std::string> not_identified;
+  std::vector<std::string> not_identified;  ///< codes
   double stalled_s = 0.0;
   int begun_again = 0;
   std::size_t cycles = 0;  ///< of the session
@@ -192,7 +192,9 @@ inline LineRun run_on_the_line(const std::string& tpm, int late_ms) {
     run.identified = called(words, "identify");
     if (!std::filesystem::exists(file)) return run;
     const Json json = files::parse_json(text_of(file), file);
-    run.not_identified = json.value("not_identified", std::vector<std::string>());
+    for (const Json& remark : json.value("not_identified", Json::array())) {
+      run.not_identified.push_back(remark.at("code").get<std::string>());
+    }
     run.stalled_s = json.at("measurement").at("stalled_s").get<double>();
     run.begun_again = json.at("measurement").at("begun_again").get<int>();
     if (run.identified != 0) return run;

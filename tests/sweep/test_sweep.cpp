@@ -141,10 +141,10 @@ TEST_CASE("the file of results holds each cell at its place, whatever the blocks
   static_cast<void>(result_of(sweep, folder / "a.h5"));
   const Hdf5Reader file(folder / "a.h5");
   CHECK(file.extents("/force") == std::vector<std::uint64_t>{3, 4, 5, 6});
-  CHECK(file.numbers("/force_time") == std::vector<double>{0, 2, 4, 6, 8, 10});
+  CHECK(file.numbers("/force_time_s") == std::vector<double>{0, 2, 4, 6, 8, 10});
   CHECK(file.numbers("/x").back() == 0.04);
   CHECK(file.attribute("/peak_force", "units") == "N");
-  const auto texts = file.texts("/reason_text");
+  const auto texts = file.texts("/reasons");
   REQUIRE(texts.size() == 3);
   CHECK((texts[0].empty() && texts[1] == "too close"));
   const auto blocks = all_blocks(sweep);

@@ -123,8 +123,9 @@ def _passed_limits(file: Any) -> Iterator[str]:
     for limit in file["validity"].values():
         if "passed" not in limit.attrs:
             continue
-        meaning, passed = (v.decode() if isinstance(v, bytes) else v for v in (limit.attrs["meaning"], limit.attrs["passed"]))
-        if passed == "yes":
+        if limit.attrs["passed"]:
+            meaning = limit.attrs["meaning"]
+            meaning = meaning.decode() if isinstance(meaning, bytes) else meaning
             yield f"{meaning}: from {limit['first_time_s'][()].ravel()[0]:.4g} s on"
 
 

@@ -179,7 +179,7 @@ class Design:
     @property
     def warnings(self) -> list[str]:
         """What was left out, and what the check of the expected intervals found against them."""
-        left_out = [f"left out: {words}" for words in self._document["left_out"]]
+        left_out = [f"left out: {limit['text']}" for limit in self._document["left_out"]]
         return left_out + [remark["text"] for remark in self.remarks]
 
     @property

@@ -60,11 +60,9 @@ std::string_view quantity_short_name(Quantity quantity) noexcept {
 }
 
 std::string si_key(Quantity quantity, std::string_view part) {
-  std::string key(quantity_short_name(quantity));
-  for (const std::string_view piece : {part, si_symbol(quantity_dimension(quantity))}) {
-    if (!piece.empty()) key.append("_").append(piece);
-  }
-  return key;
+  std::string name(quantity_short_name(quantity));
+  if (!part.empty()) name.append("_").append(part);
+  return si_key(name, quantity_dimension(quantity));
 }
 
 Quantity observable_quantity(Observable observable) noexcept {

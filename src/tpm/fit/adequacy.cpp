@@ -223,42 +223,51 @@ std::optional<EqualRun> frozen_run(const AdequacyData& data, const RestNoise& no
   return run;
 }
 
-std::vector<std::string> causes_of(const AdequacyData& data, const RestNoise& noise, double level) {
-  std::vector<std::string> causes;
+std::vector<Remark> causes_of(const AdequacyData& data, const RestNoise& noise, double level) {
+  std::vector<Remark> causes;
   const double sd = std::sqrt(noise.variance);
   if (const auto run = clipped_run(data.reading, data.rest)) {
-    causes.push_back(fmt::format(
-        "clipping: {} readings in a row from {} s on are all the {}, longer than rounding makes",
-        run->length, significant(data.time_s[run->first], 4),
-        run->largest ? "largest" : "smallest"));
+    causes.push_back(
+        {"clipping",
+         fmt::format("clipping: {} readings in a row from {} s on are all the {}, longer than "
+                     "rounding makes",
+                     run->length, significant(data.time_s[run->first], 4),
+                     run->largest ? "largest" : "smallest")});
   }
   if (const auto lost = signal_lost(data, noise)) {
     causes.push_back(
-        fmt::format("{}: from {} s on readings are {} at the level of the rest{}",
-                    lost->to_the_end ? "lost signal, or a fluid whose response ends with the motion"
-                                     : "lost signal",
-                    significant(lost->at_s, 4), lost->to_the_end ? "to the end" : "back",
-                    lost->to_the_end ? "" : " under a load"));
+        {lost->to_the_end ? "signal_ends" : "signal_lost",
+         fmt::format("{}: from {} s on readings are {} at the level of the rest{}",
+                     lost->to_the_end
+                         ? "lost signal, or a fluid whose response ends with the motion"
+                         : "lost signal",
+                     significant(lost->at_s, 4), lost->to_the_end ? "to the end" : "back",
+                     lost->to_the_end ? "" : " under a load")});
   }
   if (const auto run = frozen_run(data, noise); run && causes.empty()) {
-    causes.push_back(fmt::format(
-        "frozen signal: {} readings in a row from {} s on are equal, longer than rounding makes",
-        run->length, significant(data.time_s[run->first], 4)));
+    causes.push_back(
+        {"signal_frozen",
+         fmt::format("frozen signal: {} readings in a row from {} s on are equal, longer than "
+                     "rounding makes",
+                     run->length, significant(data.time_s[run->first], 4))});
   }
   if (const auto trend = rest_trend(data.rest_time_s, data.rest)) {
     constexpr double kSeen = 4.0, kMatters = 1.0;
     const double moved = std::abs(trend->per_s) * (data.time_s.back() - data.time_s.front());
     if (std::abs(trend->per_s) > kSeen * trend->standard_error && moved > kMatters * sd) {
-      causes.push_back(fmt::format(
-          "drift: at rest the readings change by {} noises over as long as the fitted part lasts",
-          times_text(moved / sd)));
+      causes.push_back(
+          {"drift",
+           fmt::format("drift: at rest the readings change by {} noises over as long as the "
+                       "fitted part lasts",
+                       times_text(moved / sd))});
     }
   }
   const std::size_t early = std::max<std::size_t>(data.residual.size() / 10, 5);
   if (causes.empty() && data.residual.size() > 3 * early &&
       p_of(data.residual.subspan(early), data.parameters, noise) >= level) {
-    causes.push_back(fmt::format("transient: without the first {} samples, to {} s, it would",
-                                 early, significant(data.time_s[early], 4)));
+    causes.push_back(
+        {"transient", fmt::format("transient: without the first {} samples, to {} s, it would",
+                                  early, significant(data.time_s[early], 4))});
   }
   return causes;
 }

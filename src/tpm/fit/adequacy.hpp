@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "tpm/fit/likelihood/quantum.hpp"
+#include "tpmkit/error.hpp"
 
 namespace tpm::fit {
 
@@ -55,7 +56,7 @@ struct Adequacy {
   double noise_sd = 0.0;             ///< at rest, with the rounding of the readings
   double rest_degrees = 0.0;         ///< degrees of freedom of its square
   double p_value = 1.0;              ///< of a ratio at least this large if the law is right
-  std::vector<std::string> causes;   ///< likely ones, if not described
+  std::vector<Remark> causes;        ///< likely ones, if not described
 };
 
 /// The longest run of equal readings at the largest or smallest value that is longer than rounding

@@ -57,7 +57,7 @@ struct ParameterResult {
   bool only_if_described = false;
   /// Why the minimum itself is not trusted ("found by one start of 5", and what to do); it is then
   /// not identified, whatever its profile says.
-  std::string unconfirmed;
+  std::optional<Remark> unconfirmed;
   std::string summary;  ///< one sentence
   Profile profile;
 };

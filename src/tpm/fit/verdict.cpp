@@ -138,9 +138,10 @@ std::string range_words(const ParameterResult& p, double level) {
             "{} = {} is not identified: {}: not separable; {} interval without drift {}", f.name,
             in_sized_unit(p, p.estimate), p.not_separable, percent(level), interval);
       }
-      if (!p.unconfirmed.empty()) {
+      if (p.unconfirmed) {
         return fmt::format("{} = {}, {}; {} interval of this minimum {}", f.name,
-                           in_sized_unit(p, p.estimate), p.unconfirmed, percent(level), interval);
+                           in_sized_unit(p, p.estimate), p.unconfirmed->text, percent(level),
+                           interval);
       }
       return fmt::format("{} = {} is identified: {} interval {}{}{}", f.name,
                          in_sized_unit(p, p.estimate), percent(level), interval, drift_note(p),
@@ -178,7 +179,7 @@ std::string verdict_text(const ParameterResult& p) {
   if (!p.not_separable.empty()) {
     return fmt::format("not identified: {}: not separable", p.not_separable);
   }
-  if (!p.unconfirmed.empty()) return "not identified: " + p.unconfirmed;
+  if (p.unconfirmed) return "not identified: " + p.unconfirmed->text;
   std::string text(verdict_name(p.verdict));
   for (std::size_t i = 0; i < p.conditional_on.size(); ++i) {
     const Condition& c = p.conditional_on[i];

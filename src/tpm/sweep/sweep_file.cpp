@@ -170,8 +170,8 @@ void add_formulas(const std::vector<SweepOutputKeys>& outputs, Sweep& sweep) {
 /// Those of axes and parameters differ from each other already.
 void require_own_names(const Sweep& sweep, const DocumentPlace& axes,
                        const DocumentPlace& outputs) {
-  std::set<std::string> taken{"sweep",          "status", "reason",    "reason_text",
-                              "error_estimate", "model",  "model_text"};
+  std::set<std::string> taken{"sweep",          "status", "reason", "reasons",
+                              "error_estimate", "model",  "models"};
   for (const std::string& name : sweep.model->counted()) taken.insert("count_" + name);
   const auto take = [&](const std::string& name, const DocumentPlace& place) {
     if (taken.insert(name).second) return;
@@ -185,7 +185,7 @@ void require_own_names(const Sweep& sweep, const DocumentPlace& axes,
   for (const SweepVariable& variable : sweep.variables) {
     require_identifier(variable.name, outputs.where);
     take(variable.name, outputs);
-    if (!variable.times_s.empty()) take(variable.name + "_time", outputs);
+    if (!variable.times_s.empty()) take(variable.name + "_time_s", outputs);
   }
 }
 

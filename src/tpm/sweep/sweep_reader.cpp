@@ -33,7 +33,7 @@ SweepReader::SweepReader(const std::filesystem::path& file) : file_(file) {
     axes_[axis(file_.attribute(path_of(name), "axis"))].parameters.push_back(name);
   }
   const auto add = [this](const std::string& name, bool counts) {
-    const std::string path = path_of(name), time = fmt::format("/{}_time", name);
+    const std::string path = path_of(name), time = fmt::format("/{}_time_s", name);
     variables_.push_back({name, file_.attribute(path, "units"), file_.attribute(path, "long_name"),
                           file_.has(time) ? file_.numbers(time) : std::vector<double>{}, counts});
   };
@@ -74,7 +74,7 @@ CellTally SweepReader::tally() const {
       tally.failed += status == 2.0 ? 1 : 0;
     }
   });
-  const auto texts = file_.texts("/reason_text");
+  const auto texts = file_.texts("/reasons");
   tally.reasons.assign(texts.begin() + 1, texts.end());
   return tally;
 }
@@ -93,8 +93,8 @@ std::string SweepReader::parameter_target(const std::string& name) const {
 
 std::vector<std::pair<std::string, std::uint64_t>> SweepReader::models() const {
   std::vector<std::pair<std::string, std::uint64_t>> models;
-  if (!file_.has("/model_text")) return models;
-  for (const std::string& name : file_.texts("/model_text")) models.emplace_back(name, 0);
+  if (!file_.has("/models")) return models;
+  for (const std::string& name : file_.texts("/models")) models.emplace_back(name, 0);
   each({"model"}, [&](const auto& found) {
     for (const double model : found.front()) {
       const auto place = static_cast<std::size_t>(model);
@@ -105,7 +105,7 @@ std::vector<std::pair<std::string, std::uint64_t>> SweepReader::models() const {
 }
 
 std::string SweepReader::choice_of_models() const {
-  return file_.has("/model_text") ? file_.attribute("/model", "choice") : std::string();
+  return file_.has("/models") ? file_.attribute("/", "choice_of_models") : std::string();
 }
 
 std::vector<std::uint64_t> SweepReader::start_at(const FixedPlaces& fixed) const {

@@ -91,15 +91,14 @@ class ResultWriter {
     out_.texts("/sweep/counted", sweep.model->counted());
     write_axes();
     add_array("status", Number::uint8, "", "0 done, 1 skipped, 2 failed");
-    add_array("reason", Number::int32, "", "why not done: a place in reason_text");
+    add_array("reason", Number::int32, "", "why not done: a place in reasons");
     add_array("error_estimate", Number::float64, "",
               "of the method, in parts of the largest response");
     if (const auto models = sweep.model->models(); !models.empty()) {
-      add_array("model", Number::uint8, "",
-                "that the cell ran on: a place in model_text; 255: none");
-      out_.texts("/model_text", models);
-      out_.dimension_scale("/model_text");
-      out_.attribute("/model", "choice", sweep.model->choice_of_models(sweep.swept()));
+      add_array("model", Number::uint8, "", "that the cell ran on: a place in models; 255: none");
+      out_.texts("/models", models);
+      out_.dimension_scale("/models");
+      out_.attribute("/", "choice_of_models", sweep.model->choice_of_models(sweep.swept()));
     }
     for (const std::string& name : sweep.model->counted()) {
       add_array(fmt::format("count_{}", name), Number::int64, "", "operations");
@@ -141,8 +140,8 @@ class ResultWriter {
   }
 
   CellTally finish() {
-    out_.texts("/reason_text", reasons_.texts());
-    out_.dimension_scale("/reason_text");
+    out_.texts("/reasons", reasons_.texts());
+    out_.dimension_scale("/reasons");
     out_.commit();
     tally_.reasons.assign(reasons_.texts().begin() + 1, reasons_.texts().end());
     return tally_;
@@ -199,7 +198,7 @@ class ResultWriter {
     out_.array(path_to(variable.name), Number::float64, shape);
     describe(variable.name, variable.unit, variable.meaning);
     if (variable.times_s.empty()) return;
-    const std::string time = fmt::format("/{}_time", variable.name);
+    const std::string time = fmt::format("/{}_time_s", variable.name);
     out_.numbers(time, variable.times_s);
     out_.attribute(time, "units", "s");
     out_.dimension_scale(time);

@@ -50,7 +50,7 @@ const Block<LawAdequacy>& adequacy_block() {
        key("residual_over_noise", &A::residual_over_noise, number(kZeroOrMore),
            "ratio of standard deviations, of the worst recording"),
        required(key("summary", &A::summary, text(1), "in a sentence")),
-       key("causes", &A::causes, list(text()),
+       key("causes", &A::causes, list(remark()),
            "likely ones, where the law does not describe the data")});
   return block;
 }

@@ -225,7 +225,7 @@ Json files::to_json(const LawAdequacy& adequacy) {
   if (adequacy.residual_over_noise) {
     json["residual_over_noise"] = rounded(*adequacy.residual_over_noise, 6);
   }
-  if (!adequacy.causes.empty()) json["causes"] = adequacy.causes;
+  if (!adequacy.causes.empty()) json["causes"] = remarks_json(adequacy.causes);
   return json;
 }
 

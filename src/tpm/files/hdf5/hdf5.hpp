@@ -72,6 +72,7 @@ class Hdf5Writer {
   /// Attaches whole numbers; a single one as a scalar.
   void attribute(const std::string& object, const std::string& name,
                  const std::vector<std::int64_t>& values);
+  void real_attribute(const std::string& object, const std::string& name, double value);
 
   /// Numbers over several dimensions, to be written in parts. What is never written is zero.
   enum class Number { float64, int64, int32, uint8 };
@@ -133,6 +134,8 @@ class Hdf5Reader {
   [[nodiscard]] std::vector<std::string> texts(const std::string& name) const;
   [[nodiscard]] bool has_attribute(const std::string& object, const std::string& name) const;
   [[nodiscard]] std::string attribute(const std::string& object, const std::string& name) const;
+  /// Of a single number of any kind.
+  [[nodiscard]] double number_attribute(const std::string& object, const std::string& name) const;
 
  private:
   template <class Result, class... Parts>

@@ -138,6 +138,12 @@ void Hdf5Assembly::number_attribute(const std::string& object, const std::string
   attach(object, name, H5T_NATIVE_INT64, space, values.data());
 }
 
+void Hdf5Assembly::real_attribute(const std::string& object, const std::string& name,
+                                  double value) {
+  const QuietErrors quiet;
+  attach(object, name, H5T_NATIVE_DOUBLE, {H5Screate(H5S_SCALAR), H5Sclose}, &value);
+}
+
 void Hdf5Assembly::dimension_scale(const std::string& name) {
   const QuietErrors quiet;
   const Hdf5Handle set(H5Dopen2(file_.get(), name.c_str(), H5P_DEFAULT), H5Dclose);

@@ -27,6 +27,7 @@ class Hdf5Assembly {
                             const std::string& text);
   void number_attribute(const std::string& object, const std::string& name,
                         const std::vector<std::int64_t>& values);
+  void real_attribute(const std::string& object, const std::string& name, double value);
   void dimension_scale(const std::string& name);
   void attach_scale(const std::string& array, unsigned dimension, const std::string& scale);
   /// Ends the file. @returns its size, bytes

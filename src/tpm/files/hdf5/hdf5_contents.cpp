@@ -221,13 +221,34 @@ bool Hdf5Contents::has_attribute(const std::string& object, const std::string& n
   return H5Aexists_by_name(file_.get(), object.c_str(), name.c_str(), H5P_DEFAULT) > 0;
 }
 
-std::string Hdf5Contents::attribute(const std::string& object, const std::string& name) const {
-  const QuietErrors quiet;
+Hdf5Handle Hdf5Contents::open_attribute(const std::string& object, const std::string& name) const {
   require_inside(object, "no such object");
-  const Hdf5Handle opened(
+  Hdf5Handle opened(
       H5Aopen_by_name(file_.get(), object.c_str(), name.c_str(), H5P_DEFAULT, H5P_DEFAULT),
       H5Aclose);
   if (!opened.valid()) fail(object, fmt::format("no attribute '{}'", name), kOfTpm);
+  return opened;
+}
+
+double Hdf5Contents::number_attribute(const std::string& object, const std::string& name) const {
+  const QuietErrors quiet;
+  const Hdf5Handle opened = open_attribute(object, name);
+  const Hdf5Handle stored(H5Aget_type(opened.get()), H5Tclose);
+  const Hdf5Handle space(H5Aget_space(opened.get()), H5Sclose);
+  // HDF5 writes as many numbers as the file says into the room for one.
+  if (!is_plain_number(stored) || H5Sget_simple_extent_npoints(space.get()) != 1) {
+    fail(object, fmt::format("attribute '{}' is of another type", name), "one number");
+  }
+  double value = 0.0;
+  if (H5Aread(opened.get(), H5T_NATIVE_DOUBLE, &value) < 0) {
+    fail(object, fmt::format("attribute '{}' cannot be read", name), kWholeFile);
+  }
+  return value;
+}
+
+std::string Hdf5Contents::attribute(const std::string& object, const std::string& name) const {
+  const QuietErrors quiet;
+  const Hdf5Handle opened = open_attribute(object, name);
   const Hdf5Handle stored(H5Aget_type(opened.get()), H5Tclose);
   if (!is_text_of_any_length(stored)) {
     fail(object, fmt::format("attribute '{}' is of another type", name), "a text");

@@ -27,10 +27,12 @@ class Hdf5Contents {
   [[nodiscard]] std::vector<std::string> texts(const std::string& name) const;
   [[nodiscard]] bool has_attribute(const std::string& object, const std::string& name) const;
   [[nodiscard]] std::string attribute(const std::string& object, const std::string& name) const;
+  [[nodiscard]] double number_attribute(const std::string& object, const std::string& name) const;
 
  private:
   void require_inside(const std::string& name, std::string_view missing) const;
   [[nodiscard]] Hdf5Handle open_dataset(const std::string& name) const;
+  [[nodiscard]] Hdf5Handle open_attribute(const std::string& object, const std::string& name) const;
   void require_kept_inside(const std::string& name, const Hdf5Handle& set) const;
   [[nodiscard]] std::size_t size_of(const std::string& name, const Hdf5Handle& space,
                                     int dimensions, std::string_view expected) const;

@@ -29,7 +29,8 @@ enum class Wish : std::uint8_t {
   part,
   texts,
   has_attribute,
-  attribute
+  attribute,
+  number_attribute
 };
 
 template <class Result, class... Arguments>
@@ -63,6 +64,8 @@ std::string answer(const Hdf5Contents& file, std::string_view bytes) {
       return answer_by(&Hdf5Contents::has_attribute, file, request);
     case Wish::attribute:
       return answer_by(&Hdf5Contents::attribute, file, request);
+    case Wish::number_attribute:
+      return answer_by(&Hdf5Contents::number_attribute, file, request);
   }
   return {};
 }
@@ -174,6 +177,10 @@ bool Hdf5Reader::has_attribute(const std::string& object, const std::string& nam
 
 std::string Hdf5Reader::attribute(const std::string& object, const std::string& name) const {
   return ask<std::string>(Wish::attribute, object, name);
+}
+
+double Hdf5Reader::number_attribute(const std::string& object, const std::string& name) const {
+  return ask<double>(Wish::number_attribute, object, name);
 }
 
 }  // namespace tpm::files

@@ -29,6 +29,7 @@ enum class Part : std::uint8_t {
   text_attribute,
   fixed_text_attribute,
   number_attribute,
+  real_attribute,
   scale,
   attached_scale,
   end
@@ -61,6 +62,8 @@ std::string add_part(Hdf5Assembly& file, std::string_view bytes) {
       return add_by(&Hdf5Assembly::fixed_text_attribute, file, request);
     case Part::number_attribute:
       return add_by(&Hdf5Assembly::number_attribute, file, request);
+    case Part::real_attribute:
+      return add_by(&Hdf5Assembly::real_attribute, file, request);
     case Part::scale:
       return add_by(&Hdf5Assembly::dimension_scale, file, request);
     case Part::attached_scale:
@@ -192,6 +195,10 @@ void Hdf5Writer::fixed_text_attribute(const std::string& object, const std::stri
 void Hdf5Writer::attribute(const std::string& object, const std::string& name,
                            const std::vector<std::int64_t>& values) {
   order(*child_, Part::number_attribute, object, name, values);
+}
+
+void Hdf5Writer::real_attribute(const std::string& object, const std::string& name, double value) {
+  order(*child_, Part::real_attribute, object, name, value);
 }
 
 void Hdf5Writer::array(const std::string& name, Number kind,

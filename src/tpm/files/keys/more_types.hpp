@@ -18,6 +18,9 @@ namespace tpm::files {
 /// A unit such as "kPa"; empty or left out: of plain numbers.
 [[nodiscard]] ValueType<Unit> unit_text();
 
+/// {"code", "text"}.
+[[nodiscard]] ValueType<Remark> remark();
+
 /// A text that is not written where it is empty.
 [[nodiscard]] ValueType<std::string> text_if_any();
 

@@ -36,6 +36,14 @@ ValueType<std::string> text(std::size_t fewest) {
           [](const std::string& value) { return Json(value); }};
 }
 
+ValueType<Remark> remark() {
+  static const Block<Remark> block(
+      "remark", "that ended nothing",
+      {required(key("code", &Remark::code, text(), "its kind, which stays when the text changes")),
+       required(key("text", &Remark::text, text(), "in words, with its numbers"))});
+  return block.type();
+}
+
 ValueType<std::string> text_if_any() {
   ValueType<std::string> type = text();
   type.write = [](const std::string& value) { return value.empty() ? Json() : Json(value); };

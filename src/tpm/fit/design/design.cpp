@@ -147,27 +147,26 @@ Knowledge known_before(const DesignProblem& problem) {
   return before;
 }
 
-/// The limit that the protocol itself breaks; empty if none.
-std::string broken_limit(const MachineLimits& limits, const PlannedExperiment& e) {
+/// The limit that the protocol itself breaks.
+std::optional<Remark> broken_limit(const MachineLimits& limits, const PlannedExperiment& e) {
+  const auto said = [](const char* code, const char* words, double limit, int digits = 4) {
+    return Remark{code, fmt::format(fmt::runtime(words), significant(limit, digits))};
+  };
   if (e.rate_m_per_s > limits.rate_m_per_s) {
-    return fmt::format("rate above {} mm/s", significant(limits.rate_m_per_s * 1e3, 4));
+    return said("rate", "rate above {} mm/s", limits.rate_m_per_s * 1e3);
   }
-  if (e.depth_m > limits.depth_m) {
-    return fmt::format("depth above {} mm", significant(limits.depth_m * 1e3, 4));
-  }
-  if (e.load_N > limits.load_N) {
-    return fmt::format("load above {} N", significant(limits.load_N, 4));
-  }
+  if (e.depth_m > limits.depth_m) return said("depth", "depth above {} mm", limits.depth_m * 1e3);
+  if (e.load_N > limits.load_N) return said("load", "load above {} N", limits.load_N);
   if (e.duration_s() > limits.duration_s) {
-    return fmt::format("a recording longer than {} s", significant(limits.duration_s, 4));
+    return said("duration", "a recording longer than {} s", limits.duration_s);
   }
   if (e.total_s() > limits.total_s) {
-    return fmt::format("all repeats longer than {} s", significant(limits.total_s, 4));
+    return said("total_time", "all repeats longer than {} s", limits.total_s);
   }
   if (e.samples() > limits.samples) {
-    return fmt::format("more than {} samples", significant(limits.samples, 6));
+    return said("samples", "more than {} samples", limits.samples, 6);
   }
-  return {};
+  return std::nullopt;
 }
 
 bool same_recording(const PlannedExperiment& a, PlannedExperiment b) {
@@ -177,12 +176,12 @@ bool same_recording(const PlannedExperiment& a, PlannedExperiment b) {
 
 void evaluate_candidates(DesignResult& result, const Knowledge& before) {
   const DesignProblem& problem = result.problem;
-  std::map<std::string, int> broken;
+  std::map<std::string, std::pair<std::string, int>> broken;  // by text: code and candidates
   Progress progress("evaluating candidates", problem.candidates.size());
   for (const PlannedExperiment& e : problem.candidates) {
     progress.advance();
-    std::string limit = broken_limit(problem.limits, e);
-    if (limit.empty()) {
+    std::optional<Remark> limit = broken_limit(problem.limits, e);
+    if (!limit) {
       // Candidates that differ only in their repeats stand side by side.
       const bool again =
           !result.ranked.empty() && same_recording(result.ranked.back().experiment, e);
@@ -195,19 +194,23 @@ void evaluate_candidates(DesignResult& result, const Knowledge& before) {
         result.ranked.push_back(std::move(candidate));
         continue;
       }
-      limit = fmt::format("the load presses deeper than {} mm",
-                          significant(problem.limits.depth_m * 1e3, 4));
+      limit = Remark{"depth_under_load", fmt::format("the load presses deeper than {} mm",
+                                                     significant(problem.limits.depth_m * 1e3, 4))};
     }
-    ++broken[limit];
+    auto& [code, count] = broken[limit->text];
+    code = limit->code;
+    ++count;
   }
-  for (const auto& [limit, count] : broken) {
-    result.left_out.push_back(fmt::format("{} of {}: {}", count, problem.candidates.size(), limit));
+  for (const auto& [text, found] : broken) {
+    const auto& [code, count] = found;
+    result.left_out.push_back(
+        {code, fmt::format("{} of {}: {}", count, problem.candidates.size(), text)});
   }
   if (!result.ranked.empty()) return;
-  throw bad_input(
-      fmt::format("design '{}'", printable(problem.config.title)),
-      fmt::format("no candidate is within the limits ({})", fmt::join(result.left_out, "; ")),
-      "at least one of /candidates within /limits");
+  throw bad_input(fmt::format("design '{}'", printable(problem.config.title)),
+                  fmt::format("no candidate is within the limits ({})",
+                              fmt::join(remark_texts(result.left_out), "; ")),
+                  "at least one of /candidates within /limits");
 }
 
 void rank(DesignResult& result) {

@@ -168,7 +168,7 @@ struct DesignPair {
 struct DesignResult {
   DesignProblem problem;
   std::vector<DesignCandidate> ranked;  ///< best first; equal scores: the shorter first
-  std::vector<std::string> left_out;    ///< "12 of 96: rate above 20 mm/s"
+  std::vector<Remark> left_out;         ///< "12 of 96: rate above 20 mm/s"
   std::optional<std::size_t> cheapest;  ///< place in ranked: the least total time that identifies
                                         ///< every parameter
   DesignPair pair;                      ///< the best, and the best beside it

@@ -134,7 +134,7 @@ Json to_json(const DesignResult& result, const DesignCheck* check, std::size_t t
          {"confidence_level", problem.config.level},
          {"identified_factor", problem.factor},
          {"candidates_evaluated", result.ranked.size()},
-         {"left_out", result.left_out}};
+         {"left_out", remarks_json(result.left_out)}};
   Json list = Json::array();
   for (std::size_t i = 0; i < std::min(top, result.ranked.size()); ++i) {
     const DesignCandidate& c = result.ranked[i];
@@ -160,7 +160,7 @@ std::string to_terminal_text(const DesignResult& result, const DesignCheck* chec
   const DesignProblem& problem = result.problem;
   std::string text = fmt::format("{}\n{} candidates; best by the {}\n", problem.config.title,
                                  result.ranked.size(), criterion_words(problem));
-  for (const std::string& line : result.left_out) text += fmt::format("left out: {}\n", line);
+  for (const Remark& limit : result.left_out) text += fmt::format("left out: {}\n", limit.text);
   text += "\nexpected relative standard errors; ? marks what would not be identified\n";
   text += candidate_rows(result, top) + "\n";
   for (const std::string& line : result.summary) text += line + "\n";

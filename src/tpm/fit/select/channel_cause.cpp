@@ -283,7 +283,7 @@ void name_channel_cause(Selection& s, std::span<const PreparedRecording> recordi
     const std::string cause =
         fmt::format("{} (with that, {} leaves {} times the noise)", fmt::join(found, ", or "),
                     law_name(law), times_text(least));
-    fit.adequacy->causes.push_back(cause);
+    fit.adequacy->causes.push_back({"late_channel", cause});
     fit.adequacy->summary += fmt::format("; likely cause: {}", cause);
     return;
   }

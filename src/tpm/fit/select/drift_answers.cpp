@@ -33,7 +33,7 @@ void change_and_say(ParameterResult& p, double level, const Change& change) {
 }
 
 bool has_limits_of(const ParameterResult& p, const ParameterResult& other) {
-  return other.unconfirmed.empty() && (!p.lower || other.lower) && (!p.upper || other.upper);
+  return !other.unconfirmed && (!p.lower || other.lower) && (!p.upper || other.upper);
 }
 
 /// The interval of a coefficient of the law holds both answers, or there is none. Without profiles

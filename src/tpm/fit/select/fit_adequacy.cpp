@@ -9,6 +9,7 @@
 
 #include "tpm/base/distributions.hpp"
 #include "tpm/base/median.hpp"
+#include "tpm/base/remark.hpp"
 #include "tpm/base/text.hpp"
 #include "tpm/fit/adequacy.hpp"
 #include "tpm/fit/likelihood/load_imposed.hpp"
@@ -172,11 +173,13 @@ std::optional<Judged> worst_of(const FitResult& fit, std::span<const RestedRecor
     if (!bent.empty()) {
       one.drift_off = bent;
       one.adequacy.described = Described::not_described;
-      one.adequacy.causes.emplace_back("a drift of the zero that is not linear (a warm-up)");
+      one.adequacy.causes.push_back(
+          {"drift_not_linear", "a drift of the zero that is not linear (a warm-up)"});
     } else if (!one.drift_off.empty()) {
       Adequacy& a = one.adequacy;
       a.described = Described::not_described;
-      a.causes.emplace_back("a slow branch that the law does not have, or a drift that changes");
+      a.causes.push_back(
+          {"slow_branch", "a slow branch that the law does not have, or a drift that changes"});
     }
     if (!worst || rank(one) > rank(*worst)) worst = std::move(one);
   }
@@ -280,7 +283,8 @@ LawAdequacy stated(const FitResult& fit, const Judged& judged, std::size_t tried
   }
   result.causes = a.causes;
   if (!a.causes.empty()) {
-    result.summary += fmt::format("; likely cause: {}", fmt::join(a.causes, "; and "));
+    result.summary +=
+        fmt::format("; likely cause: {}", fmt::join(remark_texts(a.causes), "; and "));
   }
   return result;
 }

@@ -14,22 +14,6 @@
 namespace tpm::fit {
 namespace {
 
-/// "eta1_Pa_s": a key that says the unit of its SI value.
-std::string si_key(std::string_view name, Dimension dimension) {
-  std::string unit(si_symbol(dimension));
-  std::string clean;
-  for (const char c : unit) {
-    if (c == '/') {
-      clean += "_per_";
-    } else if (c == ' ') {
-      clean += '_';
-    } else if (c != '^') {
-      clean += c;
-    }
-  }
-  return clean.empty() ? std::string(name) : fmt::format("{}_{}", name, clean);
-}
-
 Json parameter_values(const FitResult& result, const std::vector<double>& natural) {
   Json values = Json::object();
   for (std::size_t i = 0; i < natural.size(); ++i) {
@@ -101,7 +85,7 @@ Json parameter_json(const ParameterResult& p, const EstimatedParameter& estimate
         {"estimate", rounded(p.with_drift->estimate)},
         {"interval", {or_null(p.with_drift->lower), or_null(p.with_drift->upper)}}};
   }
-  if (!p.unconfirmed.empty()) j["unconfirmed"] = p.unconfirmed;
+  if (p.unconfirmed) j["unconfirmed"] = remarks_json({&*p.unconfirmed, 1}).front();
   if (estimated.prior) {
     j["prior_SI"] = {{"mean", rounded(estimated.prior->mean)},
                      {"sd", rounded(estimated.prior->sd)},
@@ -194,10 +178,10 @@ Json recordings_json(const FitResult& result) {
     j["provenance"] = provenance_name(r.provenance);
     j["samples"] = r.time_s.size();
     j["samples_fitted"] = fitted;
-    j[tpm::si_key(r.response_quantity, "peak")] = rounded(r.peak);
-    j[tpm::si_key(r.response_quantity, "rms_residual")] = rounded(r.rms_residual);
+    j[si_key(r.response_quantity, "peak")] = rounded(r.peak);
+    j[si_key(r.response_quantity, "rms_residual")] = rounded(r.rms_residual);
     if (r.rms_outside) {
-      j[tpm::si_key(r.response_quantity, "rms_residual_outside")] = rounded(*r.rms_outside);
+      j[si_key(r.response_quantity, "rms_residual_outside")] = rounded(*r.rms_outside);
     }
     if (const auto count = std::count(r.censored.begin(), r.censored.end(), true); count > 0) {
       j["samples_censored"] = count;
@@ -285,7 +269,7 @@ Json to_json(const FitResult& result) {
          {"model", result.config.law ? law_name(*result.config.law) : result.config.model}};
   if (result.config.law) {
     const LawSpec& law = *result.config.law;
-    j[tpm::si_key(law.drive, "reference")] = rounded(law.reference);
+    j[si_key(law.drive, "reference")] = rounded(law.reference);
     j["coefficients_depend_on_reference"] = depends_on_reference(law);
   }
   j["choices"] = assumptions_json(result.config);

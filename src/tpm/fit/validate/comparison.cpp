@@ -80,7 +80,7 @@ class Comparer {
     }
     if (result_.quantities.empty()) {
       throw bad_input(fmt::format("recording '{}'", prepared_.name),
-                      fmt::format("no quantity can be read ({})", result_.without.front()),
+                      fmt::format("no quantity can be read ({})", result_.without.front().text),
                       "--quantity with one that both the recording and the law have");
     }
     judge();
@@ -190,8 +190,8 @@ class Comparer {
     const auto d = read_quantity(quantity, result_.parts, r_, contact, measured_);
     if (!s || !d) {
       result_.without.push_back(
-          fmt::format("{}: {}", name,
-                      d ? "the law does not predict it here" : "the recording does not have it"));
+          d ? Remark{"not_predicted", fmt::format("{}: the law does not predict it here", name)}
+            : Remark{"not_recorded", fmt::format("{}: the recording does not have it", name)});
       return;
     }
     QuantityComparison q;
@@ -207,8 +207,8 @@ class Comparer {
     if (quantity.kind == QuantityKind::half_time && q.u_D > kFirstOrder * std::abs(s->value)) {
       weights_.pop_back();
       result_.without.push_back(
-          fmt::format("{}: the readings scatter too much to tell it (u_D = {} s)", name,
-                      significant(q.u_D, 2)));
+          {"scatter", fmt::format("{}: the readings scatter too much to tell it (u_D = {} s)", name,
+                                  significant(q.u_D, 2))});
       return;
     }
     if ((d->weight.array() != 0.0 && clipped_.array()).any()) {

@@ -65,7 +65,7 @@ struct Applicability {
   double depth = 0.0, duration_s = 0.0, rate = 0.0;  ///< of the recording
   std::optional<double> fitted_depth, fitted_duration_s;
   std::optional<double> slowest, fastest;  ///< rates of the calibration, where its files were found
-  std::vector<std::string> outside;        ///< sentences; empty: inside as far as known
+  std::vector<Remark> outside;             ///< empty: inside as far as known
   std::vector<std::string> unknown;
 };
 
@@ -84,7 +84,7 @@ struct RecordingComparison {
   std::string pick;               ///< name of the reduced model that answered; empty: none
   std::vector<UnseenRise> rises;  ///< changes of the drive that the samples do not show
   std::vector<QuantityComparison> quantities;
-  std::vector<std::string> without;  ///< quantities that were asked for and cannot be read, and why
+  std::vector<Remark> without;  ///< quantities that were asked for and cannot be read, and why
   JointTest joint;
   CurveComparison curve;
   ModelVerdict verdict = ModelVerdict::not_seen;  ///< of all quantities

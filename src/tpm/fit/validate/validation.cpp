@@ -53,25 +53,29 @@ void compare_with_calibration(Applicability& a, const ValidationRequest& request
   if (!a.fitted_depth) {
     a.unknown.push_back("depth");
   } else if (a.depth > kSlack * *a.fitted_depth) {
-    a.outside.push_back(fmt::format(
-        "{} deep, {} times the {} of the calibration", drive_text(a.depth, law.spec),
-        significant(a.depth / *a.fitted_depth, 2), drive_text(*a.fitted_depth, law.spec)));
+    a.outside.push_back({"depth", fmt::format("{} deep, {} times the {} of the calibration",
+                                              drive_text(a.depth, law.spec),
+                                              significant(a.depth / *a.fitted_depth, 2),
+                                              drive_text(*a.fitted_depth, law.spec))});
   }
   if (!a.fitted_duration_s) {
     a.unknown.push_back("duration");
   } else if (a.duration_s > kSlack * *a.fitted_duration_s) {
-    a.outside.push_back(fmt::format(
-        "lasts {} s, {} times the {} s of the calibration", significant(a.duration_s, 3),
-        significant(a.duration_s / *a.fitted_duration_s, 2), significant(*a.fitted_duration_s, 3)));
+    a.outside.push_back(
+        {"duration", fmt::format("lasts {} s, {} times the {} s of the calibration",
+                                 significant(a.duration_s, 3),
+                                 significant(a.duration_s / *a.fitted_duration_s, 2),
+                                 significant(*a.fitted_duration_s, 3))});
   }
   if (!a.fastest) {
     a.unknown.push_back("rate");
   } else if (a.rate > kSlack * *a.fastest || a.rate * kSlack < *a.slowest) {
     const bool fast = a.rate > *a.fastest;
     const double nearest = fast ? *a.fastest : *a.slowest;
-    a.outside.push_back(fmt::format("ramp of {}/s, {} times the {} of the calibration",
-                                    drive_text(a.rate, law.spec), significant(a.rate / nearest, 2),
-                                    fast ? "fastest" : "slowest"));
+    a.outside.push_back(
+        {"rate", fmt::format("ramp of {}/s, {} times the {} of the calibration",
+                             drive_text(a.rate, law.spec), significant(a.rate / nearest, 2),
+                             fast ? "fastest" : "slowest")});
   }
 }
 

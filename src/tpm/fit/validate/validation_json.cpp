@@ -54,7 +54,7 @@ Json applicability_json(const Applicability& a) {
   if (a.fitted_duration_s) j["calibration_duration_s"] = rounded(*a.fitted_duration_s);
   if (a.slowest) j["calibration_slowest_SI_per_s"] = rounded(*a.slowest);
   if (a.fastest) j["calibration_fastest_SI_per_s"] = rounded(*a.fastest);
-  j["outside"] = a.outside;
+  j["outside"] = remarks_json(a.outside);
   j["unknown"] = a.unknown;
   return j;
 }
@@ -79,7 +79,7 @@ Json recording_json(const RecordingComparison& r, const Applicability& a, const 
   }
   j["compared"] = std::move(part);
   j["quantities"] = array_json(r.quantities, quantity_json);
-  j["not_compared"] = r.without;
+  j["not_compared"] = remarks_json(r.without);
   Json joint{{"rank", r.joint.rank}};
   if (r.joint.rank > 0) {
     joint["T_squared"] = rounded(r.joint.t_squared);

@@ -184,9 +184,9 @@ std::string instrument_and_probe_text(const RecordingComparison& r) {
 }
 
 std::string applicability_text(const Applicability& a) {
-  std::string text = a.outside.empty()
-                         ? std::string("inside the calibration")
-                         : fmt::format("outside the calibration: {}", fmt::join(a.outside, "; "));
+  std::string text = a.outside.empty() ? std::string("inside the calibration")
+                                       : fmt::format("outside the calibration: {}",
+                                                     fmt::join(remark_texts(a.outside), "; "));
   if (!a.unknown.empty()) {
     text += fmt::format(" (not known: {})", fmt::join(a.unknown, ", "));
   }
@@ -260,7 +260,9 @@ void add_remarks(BriefText& text, const RecordingComparison& r) {
     text.add_line(remark->code == kMustShrink ? "must shrink" : "undetermined",
                   fmt::format("{}: {}", fmt::join(names, ", "), remark->text), Rank::remark);
   }
-  for (const std::string& words : r.without) text.add_line("not compared", words, Rank::remark);
+  for (const Remark& remark : r.without) {
+    text.add_line("not compared", remark.text, Rank::remark);
+  }
 }
 
 /// Said of a press that a hand was asked for, and of what is only a part.
@@ -340,7 +342,7 @@ std::string applicability_text(const Validation& v, const std::vector<std::strin
   if (each.size() == 1) return each.front();
   // Recordings of one protocol say the same.
   const auto outside_of = [&](std::size_t i) {
-    return fmt::format("{}", fmt::join(v.applicability[i].outside, "; "));
+    return fmt::format("{}", fmt::join(remark_texts(v.applicability[i].outside), "; "));
   };
   std::vector<std::string> outside;
   bool some_inside = false;

@@ -6,6 +6,7 @@
 
 #include "tpm/base/enum_names.hpp"
 #include "tpm/base/text.hpp"
+#include "tpm/files/keys/more_types.hpp"
 #include "tpm/haptics/device/device_limits.hpp"
 
 namespace tpm::haptics {
@@ -195,7 +196,7 @@ const Block<DeviceKeys>& device_block() {
        key("coulomb_friction", &K::coulomb_friction, coulomb_block().type(),
            "recorded; it counts as no damping"),
        key("moving_mass", &K::moving_mass, mass_block().type(), "recorded"),
-       key("not_identified", &K::not_identified, list(text()),
+       key("not_identified", &K::not_identified, list(remark()),
            "what could not be measured, and why"),
        key("measurement", &K::measurement, measurement_type(), "when, with what, at which rate")});
   return block;

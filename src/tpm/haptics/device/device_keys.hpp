@@ -67,7 +67,7 @@ struct DeviceKeys {
   std::optional<EncoderStepKeys> encoder_step;
   std::optional<CoulombFrictionKeys> coulomb_friction;
   std::optional<MovingMassKeys> moving_mass;
-  std::optional<std::vector<std::string>> not_identified;
+  std::optional<std::vector<Remark>> not_identified;
   Json measurement;  ///< null: none
 };
 

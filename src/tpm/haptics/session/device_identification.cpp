@@ -43,9 +43,10 @@ Handle handle_of(DeviceIdentification& found, const HandleSolution& s) {
   const bool told = margin_N <= kMostMargin_N;  // not if the sign of the motion was never known
   if (told && rubs_N > kMostCoulomb_N) {
     found.not_identified.push_back(
-        fmt::format("delay, friction, mass: Coulomb friction of up to {} N; at most {} N let the "
-                    "handle follow edges of {} N",
-                    significant(rubs_N, 3), kMostCoulomb_N, kEdge_N));
+        {"coulomb_friction",
+         fmt::format("delay, friction, mass: Coulomb friction of up to {} N; at most {} N let the "
+                     "handle follow edges of {} N",
+                     significant(rubs_N, 3), kMostCoulomb_N, kEdge_N)});
     return Handle::not_known;
   }
   // The centring spring is a part of the forces: what is left of stiffness is a hand's.
@@ -54,19 +55,21 @@ Handle handle_of(DeviceIdentification& found, const HandleSolution& s) {
   if (!free && found.held_N_per_m > 0.0) {
     // The damping of a hand is not friction of the device, and the gate would count it.
     found.not_identified.push_back(
-        fmt::format("delay, friction: something holds the handle with {} N/m; let go of it",
-                    significant(found.held_N_per_m, 3)));
+        {"held",
+         fmt::format("delay, friction: something holds the handle with {} N/m; let go of it",
+                     significant(found.held_N_per_m, 3))});
     return Handle::held;
   }
   if (!told) {
-    found.not_identified.emplace_back(
-        "delay, friction, mass: the motion does not tell Coulomb friction; the encoder is too "
-        "coarse, or friction stops the handle");
+    found.not_identified.push_back(
+        {"friction_untold",
+         "delay, friction, mass: the motion does not tell Coulomb friction; the encoder is too "
+         "coarse, or friction stops the handle"});
     return Handle::not_known;
   }
   if (!free || s.value[1] + kSurely * error_of(s, 1) < 0.0) {
-    found.not_identified.emplace_back(
-        "delay, friction, mass: something else moves the handle; let go of it");
+    found.not_identified.push_back(
+        {"moved", "delay, friction, mass: something else moves the handle; let go of it"});
     return Handle::not_known;
   }
   return Handle::free;
@@ -102,7 +105,8 @@ void find_mass(DeviceIdentification& found, const DelayFit& fit, bool free, doub
   constexpr double kWithin = 0.1, kMostStep_m = 10.5e-6, kMostCoulomb_N = 0.05;
   constexpr double kExplainedByHand = 0.98;
   if (!free && !(fit.explained > kExplainedByHand)) {
-    found.not_identified.emplace_back("mass: whatever holds the handle is more than a spring");
+    found.not_identified.push_back(
+        {"held_not_spring", "mass: whatever holds the handle is more than a spring"});
     return;
   }
   const HandleSolution& s = fit.solution;
@@ -157,18 +161,19 @@ double IdentifyingForce::next_N(double at_m) noexcept {
 namespace {
 
 /// Why forces and motion tell nothing of the handle; empty if they do.
-std::string unusable_motion(const std::vector<IdentificationSample>& samples, double stroke_m,
-                            double step_m) {
+std::optional<Remark> unusable_motion(const std::vector<IdentificationSample>& samples,
+                                      double stroke_m, double step_m) {
   const auto saturated = std::ranges::count_if(samples, &IdentificationSample::saturated);
   if (saturated > 0) {
-    return fmt::format(
-        "the motors were saturated in {} of {} cycles, so that the force on the handle is not "
-        "known",
-        saturated, samples.size());
+    return Remark{"saturated",
+                  fmt::format("delay, friction, mass: the motors were saturated in {} of {} "
+                              "cycles, so that the force on the handle is not known",
+                              saturated, samples.size())};
   }
-  if (stroke_m >= kFewestSteps * step_m && stroke_m > 0.0) return {};
-  return fmt::format("the stroke of {} mm is below {} steps of the encoder",
-                     significant(1e3 * stroke_m, 3), kFewestSteps);
+  if (stroke_m >= kFewestSteps * step_m && stroke_m > 0.0) return std::nullopt;
+  return Remark{"small_stroke", fmt::format("delay, friction, mass: the stroke of {} mm is below "
+                                            "{} steps of the encoder",
+                                            significant(1e3 * stroke_m, 3), kFewestSteps)};
 }
 
 }  // namespace
@@ -180,7 +185,7 @@ DeviceIdentification identify_device(const std::vector<IdentificationSample>& sa
   const auto [half, margin] = window_lengths(period_s);
   const HandleTimeline line = timeline_of(samples, period_s);
   if (line.size() < 2 * margin + half) {
-    found.not_identified.emplace_back("everything: the measurement is too short");
+    found.not_identified.push_back({"too_short", "everything: the measurement is too short"});
     return found;
   }
   found.stroke_m = stroke_of(samples);
@@ -190,36 +195,40 @@ DeviceIdentification identify_device(const std::vector<IdentificationSample>& sa
   found.noise_m = noise_of(line);
   const double step_m = found.encoder_step_m.value_or(found.noise_m * std::sqrt(12.0));
   if (!found.encoder_step_m) {
-    found.not_identified.emplace_back("encoder step: changes of the position have no common step");
+    found.not_identified.push_back(
+        {"no_common_step", "encoder step: changes of the position have no common step"});
   }
-  if (std::string why = unusable_motion(samples, found.stroke_m, step_m); !why.empty()) {
-    found.not_identified.push_back("delay, friction, mass: " + why);
+  if (std::optional<Remark> why = unusable_motion(samples, found.stroke_m, step_m)) {
+    found.not_identified.push_back(*std::move(why));
     return found;
   }
   const double least_m = 2.0 * step_m;
   const HandleWindows windows = windows_of(line, half, margin, half, least_m);
   if (windows.centre.size() < kFewestWindows) {
-    found.not_identified.push_back(fmt::format(
-        "delay, friction, mass: the loop or the device stalled too often: {} of {} windows of {} "
-        "ms are whole, and {} are needed (tpm hil check)",
-        windows.centre.size(), windows.tried, significant(1e3 * kVelocityWindow_s, 3),
-        kFewestWindows));
+    found.not_identified.push_back(
+        {"stalled", fmt::format("delay, friction, mass: the loop or the device stalled too often: "
+                                "{} of {} windows of {} "
+                                "ms are whole, and {} are needed (tpm hil check)",
+                                windows.centre.size(), windows.tried,
+                                significant(1e3 * kVelocityWindow_s, 3), kFewestWindows)});
     return found;
   }
   const DelayFit fit = fit_delay(line, windows, half);
   constexpr double kLeastExplainedAlone = 0.95;  // in a second of the check it may be less
   if (!(fit.explained > kLeastExplainedAlone) || !(fit.solution.value[0] > 0.0)) {
-    found.not_identified.push_back(fmt::format(
-        "delay, friction, mass: the motion follows from the forces to {} % only; something else "
-        "moves the handle, or friction holds it",
-        significant(100.0 * std::max(fit.explained, 0.0), 2)));
+    found.not_identified.push_back(
+        {"unexplained", fmt::format("delay, friction, mass: the motion follows from the forces to "
+                                    "{} % only; something else "
+                                    "moves the handle, or friction holds it",
+                                    significant(100.0 * std::max(fit.explained, 0.0), 2))});
     return found;
   }
   const std::vector<double> delays = edge_delays(line, fit, {half, margin}, least_m);
   if (delays.size() < kFewestEdges) {
-    found.not_identified.emplace_back(
-        "delay: the loop or the device stalled at all but a few edges of the force (tpm hil "
-        "check)");
+    found.not_identified.push_back(
+        {"stalled_at_edges",
+         "delay: the loop or the device stalled at all but a few edges of the force (tpm hil "
+         "check)"});
     return found;
   }
   const Handle handle = handle_of(found, fit.solution);

@@ -39,7 +39,7 @@ struct DeviceIdentification {
   /// They are left out.
   int stalls = 0;
   double stalled_s = 0.0;
-  std::vector<std::string> not_identified;  ///< what, and why, one line each
+  std::vector<Remark> not_identified;  ///< what, and why
 };
 
 /// Finds delay, friction and mass from the motion under known forces.

@@ -255,8 +255,8 @@ void identify(IdentifyRun& run, const std::vector<IdentificationSample>& samples
     nothing.stalled_s = found.stalled_s;
     found = nothing;
     found.not_identified.push_back(
-        fmt::format("everything: ended after {}, and {} s are needed: {}", lasted, kLeastMeasured_s,
-                    run.ended_by));
+        {"ended_early", fmt::format("everything: ended after {}, and {} s are needed: {}", lasted,
+                                    kLeastMeasured_s, run.ended_by)});
     return;
   }
   if (!run.findings.empty() && found.mass_kg) {
@@ -265,11 +265,12 @@ void identify(IdentifyRun& run, const std::vector<IdentificationSample>& samples
     found.mass_certain = false;
     found.viscous_N_s_per_m = found.viscous_lower_95_N_s_per_m = std::nullopt;
     found.coulomb_low_N = found.coulomb_high_N = std::nullopt;
-    found.not_identified.push_back("friction, mass: the device noticed: " +
-                                   run.findings.front().text);
+    found.not_identified.push_back(
+        {"device_finding", "friction, mass: the device noticed: " + run.findings.front().text});
   }
   if (run.ended_by.empty()) return;
-  found.not_identified.push_back(fmt::format("everything after {}: {}", lasted, run.ended_by));
+  found.not_identified.push_back(
+      {"ended", fmt::format("everything after {}: {}", lasted, run.ended_by)});
 }
 
 /// What would help against an early end of the check before a session.

@@ -4,7 +4,7 @@
 
 #include <functional>
 
-#include "tpm/files/hdf5/hdf5.hpp"
+#include "tpm/files/hdf5/hdf5_members.hpp"
 #include "tpmkit/version.hpp"
 
 namespace tpm::haptics {
@@ -149,41 +149,39 @@ void write_phases(Hdf5Writer& file, const HilSession& session) {
   numbers("/phases/to", kAim, to);
 }
 
-std::string yes_or_no(bool value) {
-  return value ? "true" : "false";
+/// The members of a header that are short: the session with its scene is in /header_json.
+Json short_header(const Json& header) {
+  Json members;
+  for (const char* key : {"version", "time", "simulated_device", "notes"}) {
+    if (header.contains(key)) members[key] = header.at(key);
+  }
+  for (const char* key : {"device", "model"}) {
+    for (const auto& [name, value] : header.at(key).items()) {
+      if (value.is_primitive()) members[key][name] = value;
+    }
+  }
+  return members;
 }
 
 }  // namespace
 
 void export_recording(const HilRecording& recording, std::string_view sha256,
                       const std::filesystem::path& file) {
-  const RecordingHeader& header = recording.opened;
   Hdf5Writer writer(file);
-  const auto attribute = [&writer](const char* name, const std::string& text) {
-    if (!text.empty()) writer.attribute("/", name, text);
-  };
-  attribute("format", "tpm hil session 1");
-  attribute("exported_by", fmt::format("tpm {}", version()));
-  attribute("recorded_by", fmt::format("tpm {}", header.version));
-  attribute("recording", recording.name);
-  attribute("recording_sha256", std::string(sha256));
-  attribute("title", recording.session.title);
-  attribute("simulated_device", yes_or_no(recording.simulated()));
-  attribute("device", device_line(recording));
-  attribute("device_kind", header.device.kind);
-  attribute("device_name", header.device.name);
-  attribute("device_serial", header.device.serial);
-  attribute("device_firmware", header.device.firmware);
-  attribute("device_library_version", header.device.library_version);
-  attribute("device_communication_mode", header.device.communication_mode);
-  attribute("time", header.time);
-  attribute("date", header.notes.date);
-  attribute("operator_code", header.notes.operator_code);
-  attribute("subject_code", header.notes.subject_code);
-  attribute("model", header.model.name);
-  attribute("whole", yes_or_no(recording.whole()));
-  attribute("damaged_rows", std::to_string(recording.damaged));
-  attribute("cause", recording.cause());
+  Json inputs = Json::array();
+  if (!sha256.empty()) inputs.push_back({{"file", recording.name}, {"sha256", sha256}});
+  write_members(writer, "/",
+                {{"command", "hil export"},
+                 {"version", version()},
+                 {"inputs", inputs},
+                 {"remarks", remarks_json(recording_remarks(recording))},
+                 {"title", recording.session.title},
+                 {"recording", recording.name},
+                 {"simulated_device", recording.simulated()},
+                 {"whole", recording.whole()},
+                 {"damaged_rows", recording.damaged},
+                 {"cause", recording.cause()},
+                 {"header", short_header(recording.header)}});
   write_rows(writer, recording);
   write_phases(writer, recording.session);
   std::vector<std::string> causes;
@@ -191,12 +189,6 @@ void export_recording(const HilRecording& recording, std::string_view sha256,
     causes.emplace_back(to_string(static_cast<StopCause>(i)));
   }
   writer.texts("/causes", causes);
-  if (const auto remarks = recording_remarks(recording); !remarks.empty()) {
-    std::vector<std::string> codes;
-    for (const Remark& remark : remarks) codes.push_back(remark.code);
-    writer.texts("/remarks/code", codes);
-    writer.texts("/remarks/text", remark_texts(remarks));
-  }
   // Texts of any length: an attribute holds 64 KB at most.
   writer.texts("/header_json", {to_text(recording.header)});
   if (recording.closed) writer.texts("/closing_json", {to_text(recording.closing)});

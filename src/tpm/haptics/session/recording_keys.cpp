@@ -82,14 +82,6 @@ const Block<RecordedModel>& recorded_model_block() {
   return block;
 }
 
-const Block<Remark>& remark_block() {
-  static const Block<Remark> block(
-      "remark", "that ended nothing",
-      {required(text_key("code", &Remark::code, "its kind, which stays when the text changes")),
-       required(text_key("text", &Remark::text, "in words, with its numbers"))});
-  return block;
-}
-
 /// Null where nothing was known.
 ValueType<std::optional<RecordedRendering>> rendering_type() {
   using R = RecordedRendering;
@@ -99,7 +91,7 @@ ValueType<std::optional<RecordedRendering>> rendering_type() {
       {required(text_key("verdict", &R::verdict, "in a word")),
        required(key("passive", &R::passive, flag(), "the contact")),
        required(key("stable", &R::stable, flag(), "the contact")),
-       key("remarks", &R::remarks, list(remark_block().type()), "that were made"),
+       key("remarks", &R::remarks, list(remark()), "that were made"),
        key("warnings", &R::warnings, list(text()),
            "their texts, in recordings of an earlier tpm")});
   return {or_null(with_others(block.form())),
@@ -196,7 +188,7 @@ const Block<RecordingClosing>& recording_closing_block() {
        unread<C>("stop_took_s", number().form, "until forces were off"),
        unread<C>("clock", clock, "in real time"),
        unread<C>("markers", list_form(marker, 0), "set by the operator"),
-       key("device_findings", &C::device_findings, list(remark_block().type()),
+       key("device_findings", &C::device_findings, list(remark()),
            "what the device noticed and that ended nothing; docs/haptics.md lists the codes, a "
            "device of a caller's own may have others")});
   return block;

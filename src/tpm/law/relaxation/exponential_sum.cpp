@@ -255,20 +255,4 @@ void ExponentialSum::springpots_in_series(double alpha, double beta, double tau_
   out.d_dashpot_d_log_tau_s = dashpot.d_x;
 }
 
-double ExponentialSum::at(const FractionalWeights& weights, double t_s) const {
-  double sum = weights.constant;
-  for (std::size_t i = 0; i < rates_.size(); ++i) {
-    sum += weights.weight[static_cast<Eigen::Index>(i)] * std::exp(-rates_[i] * t_s);
-  }
-  return sum;
-}
-
-double ExponentialSum::integral_s(const FractionalWeights& weights, double t_s) const {
-  double sum = weights.dashpot_s + weights.constant * t_s;
-  for (std::size_t i = 0; i < rates_.size(); ++i) {
-    sum -= weights.weight[static_cast<Eigen::Index>(i)] * std::expm1(-rates_[i] * t_s) / rates_[i];
-  }
-  return sum;
-}
-
 }  // namespace tpm::law

@@ -84,10 +84,6 @@ class ExponentialSum {
   /// Throws Error(bad_input) unless alpha and beta are from 0 to 1 and tau_s > 0 and finite.
   void springpots_in_series(double alpha, double beta, double tau_s, FractionalWeights& out) const;
 
-  /// The sum at a time > 0, and its integral from 0 on (with the dashpot).
-  [[nodiscard]] double at(const FractionalWeights& weights, double t_s) const;
-  [[nodiscard]] double integral_s(const FractionalWeights& weights, double t_s) const;
-
  private:
   void prepare(FractionalWeights& out) const;
 

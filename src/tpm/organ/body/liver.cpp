@@ -92,9 +92,10 @@ Organ fill_liver(const LiverRequest& request) {
   organ.name = fmt::format("liver of {} spheres in {} layers", organ.size(), request.layers);
   organ.assumptions.insert(
       organ.assumptions.begin(),
-      {"the printed coordinates of sphere 71 are metres",
-       "the shape is a liver's in a few measures",
-       "sphere 71 lies on the front of the right lobe and is loaded along its inward normal"});
+      {{"coordinates_in_metres", "the printed coordinates of sphere 71 are metres"},
+       {"shape_in_few_measures", "the shape is a liver's in a few measures"},
+       {"contact_on_right_lobe",
+        "sphere 71 lies on the front of the right lobe and is loaded along its inward normal"}});
   require_valid(organ, organ.name);
   return organ;
 }

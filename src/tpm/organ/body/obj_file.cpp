@@ -201,7 +201,8 @@ class ObjReader {
     }
     if (left_out > 0) {
       contents.notes.push_back(
-          fmt::format("{} faces of fewer than three corners were left out", left_out));
+          {"faces_left_out",
+           fmt::format("{} faces of fewer than three corners were left out", left_out)});
     }
     contents.mesh.vertices.resize(3, static_cast<Eigen::Index>(used_.size()));
     for (std::size_t v = 0; v < used_.size(); ++v) {

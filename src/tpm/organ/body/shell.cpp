@@ -209,7 +209,7 @@ struct OuterLayer {
   Positions position;
   Eigen::Matrix3Xd normal;
   std::optional<std::size_t> contact;
-  std::string assumption;  ///< about the contact
+  Remark assumption;  ///< about the contact
 };
 
 OuterLayer outer_layer(const Surface& surface, const ShellPlan& plan, const ShellRequest& request) {
@@ -221,9 +221,13 @@ OuterLayer outer_layer(const Surface& surface, const ShellPlan& plan, const Shel
     outer.contact = nearest_of(outer.position, plan.in_layer(plan.layers - 1), *request.landing);
     site = flatten_landing_site(surface, outer.position, *outer.contact, plan.spacing);
     outer.assumption =
-        site.flat ? fmt::format("the outer layer is flat within {} spacings of the contact sphere",
-                                kLandingReach)
-                  : "the outer layer is too curved around the contact sphere to be made flat there";
+        site.flat
+            ? Remark{"flat_at_contact",
+                     fmt::format("the outer layer is flat within {} spacings of the contact sphere",
+                                 kLandingReach)}
+            : Remark{"curved_at_contact",
+                     "the outer layer is too curved around the contact sphere to be made flat "
+                     "there"};
   }
   outer.normal.resize(3, outer.position.cols());
   for (Eigen::Index i = 0; i < outer.position.cols(); ++i) {
@@ -263,12 +267,14 @@ Organ fill_shell(const Surface& surface, const ShellRequest& request) {
   organ.spacing = plan.spacing;
   organ.radius = request.radius.value_or(0.5 * plan.spacing);
   organ.contact = outer.contact;
-  organ.assumptions.emplace_back("the centres of the outer layer lie on the surface");
+  organ.assumptions.push_back(
+      {"centres_on_surface", "the centres of the outer layer lie on the surface"});
   if (outer.contact) organ.assumptions.push_back(outer.assumption);
   if (plan.layers > 1) {
-    organ.assumptions.emplace_back("the spheres are split evenly over the layers");
-    organ.assumptions.push_back(fmt::format("the layers are {:.4g} mm apart, {:.3g} spacings",
-                                            plan.step * 1e3, plan.step / plan.spacing));
+    organ.assumptions.push_back({"layers_even", "the spheres are split evenly over the layers"});
+    organ.assumptions.push_back(
+        {"layer_distance", fmt::format("the layers are {:.4g} mm apart, {:.3g} spacings",
+                                       plan.step * 1e3, plan.step / plan.spacing)});
   }
   require_valid(organ, organ.name);
   return organ;

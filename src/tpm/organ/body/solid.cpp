@@ -434,15 +434,20 @@ Organ fill_solid(const Surface& surface, const SolidRequest& request) {
   organ.name = fmt::format("solid filling of {} spheres", filling.count());
   organ.spacing = filling.spacing;
   organ.radius = request.radius.value_or(0.5 * filling.spacing);
-  organ.assumptions.emplace_back("the centres of the outer layer lie on the surface");
   organ.assumptions.push_back(
-      fmt::format("the inside is a lattice ({})", entry_of(kLatticeWords, request.lattice).text));
+      {"centres_on_surface", "the centres of the outer layer lie on the surface"});
+  organ.assumptions.push_back(
+      {"inside_lattice",
+       fmt::format("the inside is a lattice ({})", entry_of(kLatticeWords, request.lattice).text)});
   const auto added = std::count_if(
       filling.inner.begin(), filling.inner.end(),
       [&](const InnerSphere& sphere) { return sphere.point >= filling.lattice_points; });
   if (added > 0) {
-    organ.assumptions.push_back(fmt::format(
-        "{} spheres off the lattice support the outer layer where it has too few below it", added));
+    organ.assumptions.push_back(
+        {"supporting_spheres",
+         fmt::format("{} spheres off the lattice support the outer layer where it has too few "
+                     "below it",
+                     added)});
   }
   require_valid(organ, organ.name);
   return organ;

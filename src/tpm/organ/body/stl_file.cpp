@@ -70,7 +70,8 @@ class StlText {
     while (is_word(peek(), "solid")) read_solid();
     if (!peek().empty()) {
       const std::size_t rest = text_.size() - (at_ - word_.size());
-      notes_.push_back(fmt::format("{} bytes behind the last solid were left out", rest));
+      notes_.push_back(
+          {"bytes_left_out", fmt::format("{} bytes behind the last solid were left out", rest)});
     }
     if (corners_.empty()) throw bad_input(where_, "holds no triangles", "a closed surface");
     return {mesh_of_corners(corners_), std::move(notes_)};
@@ -115,7 +116,8 @@ class StlText {
     while (true) {
       const std::string_view word = peek();
       if (word.empty()) {
-        notes_.emplace_back("the last solid has no 'endsolid'; the file may have been cut off");
+        notes_.push_back(
+            {"no_endsolid", "the last solid has no 'endsolid'; the file may have been cut off"});
         return;
       }
       if (is_word(word, "endsolid")) {
@@ -167,7 +169,7 @@ class StlText {
   std::string_view word_;  ///< looked at and not taken; empty if there is none
   std::size_t at_ = 0;     ///< behind the last word that was looked at
   std::vector<MeshCorner> corners_;
-  std::vector<std::string> notes_;
+  std::vector<Remark> notes_;
 };
 
 MeshContents parse_binary(std::string_view bytes, std::uint32_t count, std::string_view where) {
@@ -198,7 +200,8 @@ MeshContents parse_binary(std::string_view bytes, std::uint32_t count, std::stri
   MeshContents contents{mesh_of_corners(corners), {}};
   if (bytes.size() > end) {
     contents.notes.push_back(
-        fmt::format("{} bytes behind the last triangle were left out", bytes.size() - end));
+        {"bytes_left_out",
+         fmt::format("{} bytes behind the last triangle were left out", bytes.size() - end)});
   }
   return contents;
 }

@@ -8,10 +8,10 @@
 namespace tpm::organ {
 
 /// The triangles of a mesh file as they stand there, without its unit, and what of the file was not
-/// needed, one sentence each.
+/// needed.
 struct MeshContents {
   TriangleMesh mesh;
-  std::vector<std::string> notes;
+  std::vector<Remark> notes;
 };
 
 /// Reads STL, binary or text: text begins with "solid" in any case and holds no control characters,

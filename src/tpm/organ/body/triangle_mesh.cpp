@@ -275,11 +275,12 @@ ClosedMesh closed_mesh(const TriangleMesh& mesh, std::string_view where) {
   const Eigen::Index dropped = mesh.triangles.cols() - result.mesh.triangles.cols();
   if (dropped > 0) {
     result.notes.push_back(
-        fmt::format("{} triangles shrunk to a point or a line were dropped", dropped));
+        {"triangles_dropped",
+         fmt::format("{} triangles shrunk to a point or a line were dropped", dropped)});
   }
   if (mesh_volume(result.mesh) < 0.0) {
     result.mesh.triangles.row(1).swap(result.mesh.triangles.row(2));
-    result.notes.emplace_back("the triangles faced inwards and were turned");
+    result.notes.push_back({"triangles_turned", "the triangles faced inwards and were turned"});
   }
   return result;
 }

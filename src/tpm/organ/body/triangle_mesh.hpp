@@ -25,10 +25,10 @@ struct TriangleMesh {
 /// Volume inside a closed mesh, m^3; negative where the triangles face inwards.
 [[nodiscard]] double mesh_volume(const TriangleMesh& mesh);
 
-/// A mesh that bounds one body, and what had to be done to it, one sentence each.
+/// A mesh that bounds one body, and what had to be done to it.
 struct ClosedMesh {
   TriangleMesh mesh;
-  std::vector<std::string> notes;
+  std::vector<Remark> notes;
 };
 
 /// Joins vertices closer than 1e-7 of the mesh's size, drops triangles that vanish by that, turns a

@@ -8,7 +8,7 @@
 
 #include "tpm/base/text.hpp"
 #include "tpm/files/file.hpp"
-#include "tpm/files/hdf5/hdf5.hpp"
+#include "tpm/files/hdf5/hdf5_members.hpp"
 #include "tpm/organ/run/smoothness.hpp"
 #include "tpm/organ/run/step_fields.hpp"
 #include "tpm/organ/scene/network_file.hpp"
@@ -31,12 +31,13 @@ std::string step_group(std::size_t step) {
 
 void write_provenance(const ExperimentScene& scene, const SimulationRun& run, Hdf5Writer& file) {
   const FormulationChoice& f = scene.formulation;
-  file.attribute("/", "scene", scene.text);
-  file.attribute("/", "scene_sha256", sha256_hex(scene.text));
-  file.attribute("/", "formulation", f.kind);
-  file.attribute("/", "network", f.mass_spring ? "mass_spring" : "tissue");
-  file.attribute("/", "provenance", "model");
-  file.numbers("/settings/tolerance", {f.tolerance});
+  write_members(file, "/",
+                {{"scene", scene.text},
+                 {"scene_sha256", sha256_hex(scene.text)},
+                 {"formulation", f.kind},
+                 {"network", f.mass_spring ? "mass_spring" : "tissue"},
+                 {"provenance", "model"},
+                 {"tolerance", f.tolerance}});
   if (f.masses) {
     file.numbers("/settings/damping_ratio", {f.damping_ratio});
     if (tool_count(scene) > 0) {
@@ -184,8 +185,8 @@ void write_validity(const Validity& validity, Hdf5Writer& file) {
     const ValidityBreach& breach = validity.of(limit);
     const std::string group = fmt::format("/validity/{}", key_of(limit));
     file.group(group);
-    file.attribute(group, "meaning", std::string(words_of(limit)));
-    file.attribute(group, "passed", breach.first_time_s ? "yes" : "no");
+    write_members(file, group,
+                  {{"meaning", words_of(limit)}, {"passed", breach.first_time_s.has_value()}});
     if (!breach.first_time_s) continue;
     std::vector<std::int32_t> numbers;
     for (const std::size_t sphere : breach.spheres) {
@@ -320,9 +321,9 @@ fs::path write_simulation(const ExperimentScene& scene, const RunNetwork& networ
                step_group(k), file);
   }
   file.numbers("/steps/time_s", times);
-  file.attribute("/steps", "validity",
-                 "of each sphere the sum of 1: indented by more than 10 mm, 2: more than 12 mm, 4: "
-                 "at a lateral bond turned by more than 30 degrees");
+  file.attribute("/steps", "meaning",
+                 "validity: of each sphere the sum of 1: indented by more than 10 mm, 2: more than "
+                 "12 mm, 4: at a lateral bond turned by more than 30 degrees");
   file.commit();
   fs::path description = path;
   description.replace_extension(".xdmf");

@@ -6,6 +6,7 @@
 #include <numeric>
 
 #include "tpm/files/file.hpp"
+#include "tpm/files/hdf5/hdf5_members.hpp"
 #include "tpm/organ/scene/bond_laws_file.hpp"
 #include "tpm/organ/scene/xdmf.hpp"
 #include "tpmkit/version.hpp"
@@ -112,9 +113,10 @@ void write_network_datasets(const Tissue& tissue, Hdf5Writer& file) {
   write_spheres(tissue, file);
   write_bonds(tissue.network, file);
   write_bond_laws(tissue, file);
-  file.attribute("/", "title", tissue.title);
-  file.attribute("/", "written_by", fmt::format("tpm {}", version()));
-  file.attribute("/", "assumptions", fmt::format("{}", fmt::join(organ.assumptions, "; ")));
+  write_members(file, "/",
+                {{"title", tissue.title},
+                 {"version", version()},
+                 {"assumptions", remarks_json(organ.assumptions)}});
   file.numbers("/spacing_m", {organ.spacing});
   file.numbers("/radius_m", {organ.radius});
 }

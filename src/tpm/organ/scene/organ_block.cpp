@@ -106,8 +106,9 @@ Organ parse_liver(const OrganKeys& block, const DocumentPlace& place) {
         solid_filling(surface, block, front_of_right_lobe(request.shape, surface).position, place);
     organ.name = fmt::format("liver filled with {} spheres", organ.size());
     organ.assumptions.insert(organ.assumptions.begin(),
-                             "the shape is a liver's in a few measures; the probe comes from the "
-                             "front of the right lobe");
+                             {"shape_in_few_measures",
+                              "the shape is a liver's in a few measures; the probe comes from the "
+                              "front of the right lobe"});
     return organ;
   }
   if (block.spacing_m) request.spacing = block.spacing_m;

@@ -203,9 +203,10 @@ Tissue tissue_of(const SceneKeys& scene, std::string_view where,
   if (scene.material.E_Pa) {
     scale_to_tissue(*scene.material.E_Pa, scene.material.nu, tissue, place.key("material"));
   } else if (!scene.bonds.spacing_law && !star) {
-    tissue.network.organ.assumptions.emplace_back(
-        "spacing law paper, since the scene states neither E nor a law: the stiffness of a bond "
-        "does not follow the spacing");
+    tissue.network.organ.assumptions.push_back(
+        {"spacing_law_paper",
+         "spacing law paper, since the scene states neither E nor a law: the stiffness of a bond "
+         "does not follow the spacing"});
   }
   add_anchors(scene.anchors.value_or(usual_anchors(star, tissue.liver)), tissue,
               place.key("anchors"));

@@ -91,7 +91,7 @@ Json network_json(const Tissue& tissue, const NetworkInspection& inspection) {
   }
   json["effective_instantaneous"] = moduli_json(inspection.instantaneous);
   json["effective_equilibrium"] = moduli_json(inspection.equilibrium);
-  json["assumptions"] = organ.assumptions;
+  json["assumptions"] = remarks_json(organ.assumptions);
   json["unused_blocks"] = tissue.unused_blocks;
   return json;
 }
@@ -127,8 +127,8 @@ std::string network_text(const Tissue& tissue, const NetworkInspection& inspecti
         significant(inspection.contact_over_star->equilibrium, 7));
   }
   text += moduli_text(inspection);
-  for (const std::string& assumption : organ.assumptions) {
-    text += fmt::format("assumed: {}\n", assumption);
+  for (const Remark& assumption : organ.assumptions) {
+    text += fmt::format("assumed: {}\n", assumption.text);
   }
   return text + unused_words(tissue);
 }

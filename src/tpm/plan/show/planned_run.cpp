@@ -4,7 +4,7 @@
 
 #include "tpm/base/text.hpp"
 #include "tpm/files/file.hpp"
-#include "tpm/files/hdf5/hdf5.hpp"
+#include "tpm/files/hdf5/hdf5_members.hpp"
 #include "tpm/plan/show/plan_report.hpp"
 #include "tpm/plan/show/trajectory_report.hpp"
 #include "tpmkit/version.hpp"
@@ -26,49 +26,37 @@ std::string response_words(const Plan& plan) {
                      significant(100.0 * shown_error(plan, *error), 3));
 }
 
-/// Under /claim: what is claimed of which quantity, in numbers and words.
-void write_claim(const Plan& plan, Hdf5Writer& file) {
+/// The plan, the claim and its errors.
+Json planned_members(const Plan& plan, const ExperimentScene& scene) {
   const PlannedCandidate& c = plan.chosen();
-  const PlanClaim claim = claim_of(plan);
-  file.group("/claim");
-  file.attribute("/claim", "quantity", claim.quantity);
-  file.attribute("/claim", "norm", claim.norm);
-  file.attribute("/claim", "protocol", claim.protocol);
-  file.numbers("/claim/claimed_error", {rounded(shown_error(plan, *c.claimed_error), 6)});
-  file.numbers("/claim/verified_error", {rounded(shown_error(plan, *c.verified_error), 6)});
-  if (c.verified_response_error) {
-    file.numbers("/claim/verified_response_error",
-                 {rounded(shown_error(plan, *c.verified_response_error), 6)});
-  }
-  file.numbers("/claim/tolerance", {plan.request.tolerance});
-  if (plan.masses_left_out) file.numbers("/claim/masses_left_out", {*plan.masses_left_out});
-  const std::vector<Remark> remarks = plan_remarks(plan);
-  if (!remarks.empty()) file.attribute("/claim", "remarks", to_text(remarks_json(remarks)));
+  const auto& response = c.verified_response_error;
+  return {{"title", plan.title},
+          {"version", version()},
+          {"scene_sha256", sha256_hex(scene.text)},
+          {"model", c.name},
+          {"formulation", c.formulation},
+          {"settings", c.settings},
+          {"claim", claim_json(plan)},
+          {"claimed_error", rounded(shown_error(plan, c.claimed_error.value()), 6)},
+          {"verified_error", rounded(shown_error(plan, c.verified_error.value()), 6)},
+          {"verified_response_error",
+           response ? Json(rounded(shown_error(plan, *response), 6)) : Json(nullptr)},
+          {"tolerance", plan.request.tolerance},
+          {"masses_matter", masses_matter_json(plan)}};
+}
+
+Json planned_remarks(const Plan& plan) {
+  return {{"validity_passed", remarks_json(plan.validity)},
+          {"remarks", remarks_json(plan_remarks(plan))}};
 }
 
 }  // namespace
 
 Json planned_run_json(const Plan& plan, const ExperimentScene& scene,
                       const std::vector<double>& times_s, const Trajectory& answer) {
-  const PlannedCandidate& c = plan.chosen();
-  Json json{
-      {"title", plan.title},
-      {"version", version()},
-      {"scene_sha256", sha256_hex(scene.text)},
-      {"model", c.name},
-      {"formulation", c.formulation},
-      {"settings", c.settings},
-      {"claim", claim_json(plan)},
-      {"claimed_error", rounded(shown_error(plan, c.claimed_error.value()), 6)},
-      {"verified_error", rounded(shown_error(plan, c.verified_error.value()), 6)},
-      {"verified_response_error",
-       c.verified_response_error ? Json(rounded(shown_error(plan, *c.verified_response_error), 6))
-                                 : Json(nullptr)},
-      {"tolerance", plan.request.tolerance},
-      {"masses_matter", masses_matter_json(plan)}};
+  Json json = planned_members(plan, scene);
   add_trajectory(json, scene, times_s, answer);
-  json["validity_passed"] = remarks_json(plan.validity);
-  json["remarks"] = remarks_json(plan_remarks(plan));
+  json.update(planned_remarks(plan));
   return json;
 }
 
@@ -109,16 +97,13 @@ ShortAnswer short_answer(const Plan& plan, const std::vector<double>& times_s,
 void write_planned_run(const Plan& plan, const ExperimentScene& scene,
                        const std::vector<double>& times_s, const Trajectory& answer,
                        const std::filesystem::path& path) {
-  const PlannedCandidate& c = plan.chosen();
   Hdf5Writer file(path);
-  file.attribute("/", "title", plan.title);
-  file.attribute("/", "scene", scene.text);
-  file.attribute("/", "scene_sha256", sha256_hex(scene.text));
-  file.attribute("/", "written_by", fmt::format("tpm {}", version()));
-  file.attribute("/", "formulation", c.formulation);
-  file.attribute("/", "model", model_words(c));
-  file.attribute("/", "provenance", "model");
-  write_claim(plan, file);
+  write_members(file, "/", planned_members(plan, scene));
+  write_members(file, "/",
+                {{"masses_left_out", plan.masses_left_out ? Json(*plan.masses_left_out) : Json()},
+                 {"scene", scene.text},
+                 {"provenance", "model"}});
+  write_members(file, "/", planned_remarks(plan));
   write_trajectory(scene, times_s, answer, file);
   file.commit();
 }

@@ -8,6 +8,7 @@
 #include "tpm/base/sized_unit.hpp"
 #include "tpm/base/text.hpp"
 #include "tpm/files/file.hpp"
+#include "tpm/files/hdf5/hdf5_members.hpp"
 #include "tpmkit/model.hpp"
 #include "tpmkit/units.hpp"
 #include "tpmkit/version.hpp"
@@ -37,6 +38,15 @@ std::vector<std::size_t> stored_steps(const ExperimentScene& scene,
 
 bool driven_by_depth(const ExperimentScene& scene) {
   return scene.protocol.drive() == Drive::displacement;
+}
+
+Json scene_run_members(const ExperimentScene& scene) {
+  return {{"title", scene.tissue.title},
+          {"version", version()},
+          {"scene_sha256", sha256_hex(scene.text)},
+          {"network", scene.formulation.mass_spring ? "mass_spring" : "tissue"},
+          {"formulation", scene.formulation.kind},
+          {"tolerance", scene.formulation.tolerance}};
 }
 
 }  // namespace
@@ -89,13 +99,8 @@ void write_trajectory(const ExperimentScene& scene, const std::vector<double>& t
 
 Json scene_run_json(const ExperimentScene& scene, const std::vector<double>& times_s,
                     const Trajectory& answer) {
-  Json json{{"title", scene.tissue.title},
-            {"version", version()},
-            {"scene_sha256", sha256_hex(scene.text)},
-            {"network", scene.formulation.mass_spring ? "mass_spring" : "tissue"},
-            {"formulation", scene.formulation.kind},
-            {"tolerance", scene.formulation.tolerance},
-            {"steps", answer.steps}};
+  Json json = scene_run_members(scene);
+  json["steps"] = answer.steps;
   add_trajectory(json, scene, times_s, answer);
   return json;
 }
@@ -113,14 +118,8 @@ std::string scene_run_text(const ExperimentScene& scene, const std::vector<doubl
 void write_scene_run(const ExperimentScene& scene, const std::vector<double>& times_s,
                      const Trajectory& answer, const std::filesystem::path& path) {
   Hdf5Writer file(path);
-  file.attribute("/", "title", scene.tissue.title);
-  file.attribute("/", "scene", scene.text);
-  file.attribute("/", "scene_sha256", sha256_hex(scene.text));
-  file.attribute("/", "written_by", fmt::format("tpm {}", version()));
-  file.attribute("/", "formulation", scene.formulation.kind);
-  file.attribute("/", "network", scene.formulation.mass_spring ? "mass_spring" : "tissue");
-  file.attribute("/", "tolerance", shortest(scene.formulation.tolerance));
-  file.attribute("/", "provenance", "model");
+  write_members(file, "/", scene_run_members(scene));
+  write_members(file, "/", {{"scene", scene.text}, {"provenance", "model"}});
   write_trajectory(scene, times_s, answer, file);
   file.commit();
 }

@@ -110,8 +110,8 @@ std::optional<double> time_of_peak(const Hdf5Reader& file, const std::filesystem
     curve[i].response = values[i];
     curve[i].settling = settling[i] != 0;
   }
-  const bool known = file.has("/settings/tolerance");
-  const double tolerance = known ? file.numbers("/settings/tolerance").at(0) : 0.0;
+  const bool known = file.has_attribute("/", "tolerance");
+  const double tolerance = known ? file.number_attribute("/", "tolerance") : 0.0;
   return largest_point(curve, tolerance).time_s;
 }
 
@@ -168,19 +168,21 @@ void add_curves(const Hdf5Reader& file, ViewPage& page) {
 
 /// What a planned model is claimed to be accurate to, and what a reader must know of it.
 void add_claim(const Hdf5Reader& file, ViewPage& page) {
-  if (!file.has("/claim/verified_error")) return;
+  if (!file.has("/claim")) return;
   const auto share = [&](const char* name) {
-    return significant(100.0 * file.numbers(std::string("/claim/") + name).at(0), 3);
+    return significant(100.0 * file.number_attribute("/", name), 3);
   };
-  page.fact("model", file.attribute("/", "model"));
+  page.fact(
+      "model",
+      fmt::format("{} ({}{}{})", file.attribute("/", "model"), file.attribute("/", "formulation"),
+                  file.has_attribute("/", "settings") ? ", " : "",
+                  file.has_attribute("/", "settings") ? file.attribute("/", "settings") : ""));
   page.fact("claim", fmt::format("{}: error at most {} %, verified {} % ({}); {} % allowed",
                                  file.attribute("/claim", "quantity"), share("claimed_error"),
                                  share("verified_error"), file.attribute("/claim", "norm"),
                                  share("tolerance")));
-  if (!file.has_attribute("/claim", "remarks")) return;
-  for (const Json& remark : parse_json(file.attribute("/claim", "remarks"), "/claim: remarks")) {
-    page.fact("warning", remark.at("text").get<std::string>());
-  }
+  if (!file.has("/remarks")) return;
+  for (const std::string& text : file.texts("/remarks/text")) page.fact("warning", text);
 }
 
 void add_origin(const Hdf5Reader& file, ViewPage& page) {
@@ -193,9 +195,11 @@ void add_origin(const Hdf5Reader& file, ViewPage& page) {
   page.fact("origin", "computed from a model; nothing on this page was measured");
   page.fact("network", attribute("network"));
   page.fact("formulation", attribute("formulation"));
-  page.fact("written by", attribute("written_by"));
+  page.fact("written by", fmt::format("tpm {}", attribute("version")));
   page.fact("scene's SHA-256", attribute("scene_sha256"));
-  page.fact("assumptions", attribute("assumptions"));
+  if (file.has("/assumptions")) {
+    page.fact("assumptions", fmt::format("{}", fmt::join(file.texts("/assumptions/text"), "; ")));
+  }
   if (!file.has_checksum())
     page.fact("check sum", "none: the file was not written by tpm, or is older");
   page.description["scene"] = attribute("scene");
