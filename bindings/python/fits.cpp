@@ -99,6 +99,7 @@ class Fit {
                            py::arg("verdict") = verdict_text(p), py::arg("nuisance") = p.nuisance,
                            py::arg("only_if_described") = p.only_if_described,
                            py::arg("not_separable") = p.not_separable,
+                           py::arg("unconfirmed") = p.unconfirmed,
                            py::arg("with_drift") = drift ? Value(drift->estimate) : Value(),
                            py::arg("with_drift_lower") = drift ? drift->lower : Value(),
                            py::arg("with_drift_upper") = drift ? drift->upper : Value(),

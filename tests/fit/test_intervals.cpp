@@ -192,8 +192,8 @@ TEST_CASE("a minimum that one start of five finds is not called identified", "[i
   CHECK(verdict_text(fit.parameters[0]) == "identified");
   mark_unconfirmed(fit, Confirmation{5, 1, std::nullopt});
   CHECK_THAT(verdict_text(fit.parameters[0]),
-             Contains("not identified: found by one start of 5: not identified until another start "
-                      "ends there (--starts 200"));
+             Contains("not identified: found by one start of 5; another start has to end there, too "
+                      "(--starts 200"));
   CHECK_THAT(fit.parameters[0].summary, !Contains("is identified"));
 }
 

@@ -50,8 +50,8 @@ void mark_unconfirmed(FitResult& result, const Confirmation& confirmation) {
     // Of these nothing is claimed that another minimum could take back.
     if (p.verdict == Verdict::failed || p.verdict == Verdict::flat) continue;
     p.unconfirmed = fmt::format(
-        "found by one start of {}: not identified until another start ends there (--starts {}, or "
-        "a law of fewer parameters)",
+        "found by one start of {}; another start has to end there, too (--starts {}, or a law of "
+        "fewer parameters)",
         confirmation.starts, std::max(kFewest, kTimes * confirmation.starts));
     p.summary = parameter_words(p, result.config.level);
   }

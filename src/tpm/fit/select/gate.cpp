@@ -88,6 +88,7 @@ Refusal refusal_of(const Candidate& candidate, const ProtocolSpans& spans) {
       return {fmt::format("{} ends at its {} bound, and {} depends on it", c.parameter,
                           c.upper ? "upper" : "lower", p.parameter.name)};
     }
+    if (!p.unconfirmed.empty()) return {fmt::format("{}: {}", p.parameter.name, p.unconfirmed)};
     // An interval says more than the standard error, and stands in the table of the parameters.
     const bool has_interval = p.verdict == Verdict::identified || p.verdict == Verdict::lower_only;
     if (!p.standard_error && !has_interval) {
@@ -159,7 +160,10 @@ void judge_identified(Candidate& candidate, const ProtocolSpans& spans) {
 }
 
 void reassess(Candidate& chosen, const ProtocolSpans& spans) {
-  if (!chosen.identified) judge_identified(chosen, spans);
+  // Profiles show a minimum that is not trusted; nothing else that they show speaks against a law.
+  const bool doubtful = std::ranges::any_of(
+      chosen.fit.parameters, [](const ParameterResult& p) { return !p.unconfirmed.empty(); });
+  if (!chosen.identified || doubtful) judge_identified(chosen, spans);
 }
 
 void settle_choice(Selection& s, const ProtocolSpans& spans, const ProfiledFit& with_profiles) {
@@ -176,6 +180,13 @@ void settle_choice(Selection& s, const ProtocolSpans& spans, const ProfiledFit& 
     if (!next) break;
     profile(*next);
     s.recommended = least_within(s.candidates, s.margin);
+  }
+  // A law that its profiles no longer call identified gives way to the next one.
+  for (int tried = 0; tried < kMostTried; ++tried) {
+    profile(s.recommended);
+    const std::size_t next = least_within(s.candidates, s.margin);
+    if (next == s.recommended) break;
+    s.recommended = next;
   }
   profile(s.recommended);
   s.preferred.reset();
