@@ -22,6 +22,18 @@ bool is_nuisance(const FitConfig& config, std::size_t parameter) {
                      [&](const Target& target) { return table[target.parameter].nuisance; });
 }
 
+bool is_contact_under_load(const FitConfig& config, std::size_t parameter) {
+  if (!config.law || config.law->drive != Quantity::indentation_depth) return false;
+  const std::vector<LawParameter> table = law_parameters(*config.law);
+  return std::ranges::any_of(config.parameters[parameter].sets, [&](const Target& target) {
+    if (table[target.parameter].name != "contact") return false;
+    for (std::size_t i = 0; i < config.data.size(); ++i) {
+      if (config.data[i].load_imposed && target.applies_to(i)) return true;
+    }
+    return false;
+  });
+}
+
 namespace {
 
 constexpr int kReadableDigits = 4;
@@ -138,20 +150,6 @@ std::string bound_flag(const FitResult& result, const ParameterResult& nuisance)
                   in_sized_unit(nuisance, upper ? p.upper : p.lower));
   if (names.empty()) return where + "; no other parameter depends on it";
   return fmt::format("{}: what is said of {} holds only there", where, fmt::join(names, ", "));
-}
-
-/// True for the depth of contact under an imposed force. No rest measures it, unlike that under an
-/// imposed depth.
-bool is_contact_under_load(const FitConfig& config, std::size_t parameter) {
-  if (!config.law || config.law->drive != Quantity::indentation_depth) return false;
-  const std::vector<LawParameter> table = law_parameters(*config.law);
-  return std::ranges::any_of(config.parameters[parameter].sets, [&](const Target& target) {
-    if (table[target.parameter].name != "contact") return false;
-    for (std::size_t i = 0; i < config.data.size(); ++i) {
-      if (config.data[i].load_imposed && target.applies_to(i)) return true;
-    }
-    return false;
-  });
 }
 
 /// Where the best fit ends on a bound of the contact under an imposed force, the recording does not

@@ -7,6 +7,7 @@
 #include <utility>
 
 #include "tpm/base/text.hpp"
+#include "tpm/fit/conditional.hpp"
 #include "tpm/fit/select/fit_adequacy.hpp"
 #include "tpm/fit/verdict.hpp"
 
@@ -72,7 +73,13 @@ Refusal refusal_of(const Candidate& candidate, const ProtocolSpans& spans) {
     if (first.reason.empty()) first = std::move(refusal);
   };
   const auto table = law_parameters(candidate.fit.config.law.value());
-  for (const ParameterResult& p : candidate.fit.parameters) {
+  for (std::size_t i = 0; i < candidate.fit.parameters.size(); ++i) {
+    const ParameterResult& p = candidate.fit.parameters[i];
+    const bool on_bound = p.at_lower_bound || p.at_upper_bound;
+    if (on_bound && is_contact_under_load(candidate.fit.config, i)) {
+      keep({fmt::format("{} ends at its {} bound: undetermined", p.parameter.name,
+                        p.at_lower_bound ? "lower" : "upper")});
+    }
     const LawParameter* law = material_parameter(table, p.parameter.name);
     if (law == nullptr) continue;
     if (is_dashpot(p)) continue;

@@ -140,8 +140,12 @@ AutomaticBounds strain_zero_bounds(const LawSpec& law, const PreparedRecording& 
 Prior zero_prior(const PreparedRecording& r, const RestReadings& rests) {
   constexpr double kStated = 0.02;  // of the peak
   if (rests.zero) {
+    const char* pulled = rests.pulled
+                             ? "; those after withdrawal are left out: they lie lower than "
+                               "a drift explains, as if tissue still pulled the probe"
+                             : "";
     return {rests.zero->value, rests.zero->sd,
-            rests.before > 0 ? fmt::format("{} samples before contact", rests.before)
+            rests.before > 0 ? fmt::format("{} samples before contact{}", rests.before, pulled)
                              : fmt::format("{} samples after withdrawal", rests.after)};
   }
   if (r.instrument && r.instrument->zero && *r.instrument->zero > 0.0) {
