@@ -77,8 +77,8 @@ Refusal refusal_of(const Candidate& candidate, const ProtocolSpans& spans) {
     const ParameterResult& p = candidate.fit.parameters[i];
     const bool on_bound = p.at_lower_bound || p.at_upper_bound;
     if (on_bound && is_contact_under_load(candidate.fit.config, i)) {
-      keep({fmt::format("{} ends at its {} bound: undetermined", p.parameter.name,
-                        p.at_lower_bound ? "lower" : "upper")});
+      return {fmt::format("{} ends at its {} bound: undetermined", p.parameter.name,
+                          p.at_lower_bound ? "lower" : "upper")};
     }
     const LawParameter* law = material_parameter(table, p.parameter.name);
     if (law == nullptr) continue;
