@@ -76,7 +76,7 @@ Refusal refusal_of(const Candidate& candidate, const ProtocolSpans& spans) {
   for (std::size_t i = 0; i < candidate.fit.parameters.size(); ++i) {
     const ParameterResult& p = candidate.fit.parameters[i];
     const bool on_bound = p.at_lower_bound || p.at_upper_bound;
-    if (on_bound && is_contact_under_load(candidate.fit.config, i)) {
+    if (p.nuisance && on_bound && is_contact_under_load(candidate.fit.config, i)) {
       return {fmt::format("{} ends at its {} bound: undetermined", p.parameter.name,
                           p.at_lower_bound ? "lower" : "upper")};
     }
