@@ -238,6 +238,18 @@ TEST_CASE("a force that was held on an indentation is imposed, and the depth com
   }
 }
 
+TEST_CASE("creep under a force that is as noisy as the depth is said to be creep", "[creep]") {
+  test::PressTrial trial;
+  trial.noise_N = 0.08;  // 1 % of the force, as of the depth
+  const PreparedRecording noisy = prepare_recording("press.csv", test::press_recording_of(trial));
+  CHECK_FALSE(noisy.load_imposed);
+  CHECK_THAT(std::string(test::remark_text(noisy.remarks, "both_channels_noisy")),
+             Contains("the force is too noisy to be taken as imposed (it was held while the depth "
+                      "went on: creep)") &&
+                 Contains("The fit takes the depth as exact: the noise of the depth makes fast "
+                          "branches look weaker"));
+}
+
 TEST_CASE(
     "nothing widens the bounds of a contact under a dead weight, and on one it is undetermined",
     "[creep][bounds]") {
