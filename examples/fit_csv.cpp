@@ -22,9 +22,9 @@ int main(int argc, char** argv) try {
     if (p.nuisance) continue;
     std::printf("%-5s = %.4g %s", p.name.c_str(), p.estimate, p.unit.c_str());
     if (p.lower && p.upper) std::printf(", 95 %% interval %.4g to %.4g", *p.lower, *p.upper);
-    const std::string verdict = p.not_separable.empty()
-                                    ? std::string(tpm::fit::verdict_name(p.verdict))
-                                    : "not told from a " + p.not_separable;
+    std::string verdict(tpm::fit::verdict_name(p.verdict));
+    if (p.unconfirmed) verdict = "not identified: " + p.unconfirmed->text;
+    if (!p.not_separable.empty()) verdict = "not told from a " + p.not_separable;
     std::printf(", %s\n", verdict.c_str());
   }
   if (fit.law) tpm::write_law("fitted_law.json", *fit.law);

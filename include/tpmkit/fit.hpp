@@ -47,9 +47,9 @@ struct FittedParameter {
   /// The second answer, where no rest tells a drift of the zero: `lower` and `upper` hold its
   /// interval, too.
   std::optional<WithDrift> with_drift = std::nullopt;
-  /// Why the minimum itself is not trusted ("found by one start of 5", and what to do); the
-  /// parameter is then not identified, whatever the verdict.
-  std::optional<Remark> unconfirmed;
+  /// Why the minimum itself is not trusted ("found by one start of 5", "contact is undetermined");
+  /// the parameter is then not identified, whatever the verdict.
+  std::optional<Remark> unconfirmed = std::nullopt;
   std::string summary;  ///< the verdict as a sentence
 };
 

@@ -113,6 +113,8 @@ struct LawUncertainty {
   std::vector<std::string> at_bound;  ///< estimated parameters that are fixed on a bound
   /// Estimated parameters that the recordings cannot tell from something else: from a drift.
   std::vector<std::string> not_separable;
+  /// Estimated parameters whose minimum is not trusted (FittedParameter::unconfirmed).
+  std::vector<std::string> unconfirmed;
 
   /// Two-sided quantile: estimate +- this times the standard error is an interval at `level`.
   [[nodiscard]] double quantile(double at_level) const;

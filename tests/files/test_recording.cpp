@@ -141,6 +141,27 @@ TEST_CASE("a preload is told from an offset by what the first movement does") {
   CHECK_THAT(all_words(found), Catch::Contains("preloaded: 0.0"));
 }
 
+TEST_CASE("a rest in the air that ends at contact is told from a preload by the withdrawal") {
+  const DrivePath withdrawn = {{0, 0}, {1, 0}, {3, 4}, {13, 4}, {16, -2}, {20, -2}};
+  Making air;
+  air.step_s = 0.02;
+  air.force_noise_N = 5e-4;
+  air.offset_N = 0.02;
+  const auto rested = phases_of(made(withdrawn, air));
+  CHECK_FALSE(rested.preloaded);
+  CHECK(rested.contact_found);
+  CHECK_THAT(rested.contact_drive, WithinAbs(0.0, 1e-4));
+  CHECK(rested.phases.front().kind == PhaseKind::before_contact);
+  // The same force at rest from tissue: clear of it the force is gone.
+  Making preload = air;
+  preload.offset_N = 0.0;
+  preload.contact_mm = -0.2;
+  CHECK(phases_of(made(withdrawn, preload)).preloaded);
+  // No withdrawal, or none further than the rest: not told.
+  CHECK(phases_of(made(kRampHold, air)).preloaded);
+  CHECK(phases_of(made({{0, 0}, {1, 0}, {3, 4}, {13, 4}, {15, 0}, {20, 0}}, air)).preloaded);
+}
+
 TEST_CASE("a contact force that is told goes before the noise") {
   Making making;
   making.step_s = 0.02;

@@ -10,6 +10,7 @@
 #include "creep_recordings.hpp"
 #include "fitted_parameter.hpp"
 #include "placed_recordings.hpp"
+#include "support/remarks.hpp"
 #include "temp_folder.hpp"
 #include "tpm/files/file.hpp"
 #include "tpm/fit/fitted_law.hpp"
@@ -18,6 +19,7 @@
 #include "tpm/fit/predict/law_prediction.hpp"
 #include "tpm/fit/select/fit_adequacy.hpp"
 #include "tpm/fit/select/selection.hpp"
+#include "tpm/fit/verdict.hpp"
 #include "tpmkit/law_model.hpp"
 
 using namespace tpm;
@@ -26,6 +28,7 @@ using namespace tpm::data;
 using namespace tpm::files;
 using namespace tpm::fit;
 using Catch::Contains;
+using Catch::StartsWith;
 using Catch::Matchers::WithinAbs;
 using Catch::Matchers::WithinRel;
 using test::CreepTrial;
@@ -232,6 +235,70 @@ TEST_CASE("a force that was held on an indentation is imposed, and the depth com
         CHECK(*p->standard_error < 0.1 * truth);
       }
       CHECK_THAT(fit.recordings.front().rms_residual, WithinRel(4e-5, 0.15));
+    }
+  }
+}
+
+TEST_CASE("creep under a force that is as noisy as the depth is said to be creep", "[creep]") {
+  test::PressTrial trial;
+  trial.noise_N = 0.08;  // 1 % of the force, as of the depth
+  const PreparedRecording noisy = prepare_recording("press.csv", test::press_recording_of(trial));
+  CHECK_FALSE(noisy.load_imposed);
+  CHECK_THAT(std::string(test::remark_text(noisy.remarks, "both_channels_noisy")),
+             Contains("the force is too noisy to be taken as imposed (it was held while the depth "
+                      "went on: creep)") &&
+                 Contains("The fit takes the depth as exact: the noise of the depth makes fast "
+                          "branches look weaker"));
+}
+
+TEST_CASE(
+    "nothing widens the bounds of a contact under a dead weight, and on one it is undetermined",
+    "[creep][bounds]") {
+  // A weight is put down between two samples: how deep it went at once is elastic, or was not yet
+  // contact. The force is straight in the depth.
+  constexpr double kContact_m = 1e-3, kNoise_m = 2e-6;
+  const auto dead_weight = [&](int samples_at_rest) {
+    Recording r;
+    r.header.id = "weight";
+    r.drive_quantity = Quantity::indentation_depth;
+    r.response_quantity = Quantity::contact_force;
+    Random random(29);
+    for (int i = -samples_at_rest; i <= 300; ++i) {
+      // A force of 2 N on 2 kN/m beside 3 kN/m that relax in 5 s: retarded in 12.5 s.
+      const double t = 0.1 * i;
+      const double creep = t < 0.0 ? 0.0 : 1e-3 - 6e-4 * std::exp(-t / 12.5);
+      r.time_s.push_back(0.1 * (i + samples_at_rest));
+      r.drive.push_back(kContact_m + creep + kNoise_m * random.normal());
+      r.response.push_back(t < 0.0 ? 0.0 : 2.0);
+    }
+    return prepare_recording("weight.csv", r);
+  };
+  const PreparedRecording one = dead_weight(20);
+  REQUIRE(one.load_imposed);
+  REQUIRE(samples_before_load(one.recording) >= 19);
+  const std::span<const PreparedRecording> span(&one, 1);
+  SetupOptions setup;
+  setup.starts = 4;
+  for (const char* law : {"linear-1", "hertz-1"}) {
+    CAPTURE(law);
+    const FitResult fit =
+        run_fit(recording_config(parse_law_name(law, "test"), span, setup), data_sets(span));
+    const ParameterResult& contact = test::find(fit, "contact");
+    CHECK_FALSE(contact.first_bounds);
+    // The probe rested at the contact, and under the weight it was 0.4 mm deeper.
+    CHECK_THAT(contact.parameter.lower, WithinAbs(kContact_m, 10.0 * kNoise_m));
+    CHECK_THAT(contact.parameter.upper, WithinAbs(kContact_m + 4e-4, 1e-5));
+    if (std::string(law) == "linear-1") continue;
+    // A straight force wants the contact of a Hertz kernel far before the specimen.
+    REQUIRE(contact.at_lower_bound);
+    CHECK_THAT(std::string(test::remark_text(fit.remarks, "contact_undetermined")),
+               Contains("contact is undetermined by this recording") &&
+                   Contains("not identified: k_inf, k1, tau1"));
+    for (const char* name : {"k1", "tau1"}) {
+      CHECK_THAT(test::find(fit, name).unconfirmed.value().text,
+                 Contains("contact is undetermined"));
+      CHECK_THAT(verdict_text(test::find(fit, name)), StartsWith("not identified: "));
+      CHECK_THAT(test::find(fit, name).summary, !Contains("is identified"));
     }
   }
 }

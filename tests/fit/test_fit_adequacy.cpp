@@ -202,6 +202,22 @@ TEST_CASE("a law that another beats decisively holds nothing for identified", "[
     return remark.code == "condition_of_choice" &&
            remark.text.find("the data prefer ") != std::string::npos;
   }));
+  // A recording that was edited keeps its number of samples: the SHA-256 of its readings tells.
+  CHECK_FALSE(test::has_remark(again.remarks, "another_choice"));
+  Recording edited = recording.recording;
+  edited.response.back() *= 1.0 + 1e-6;
+  const FitResult stale = fit_and_judge({parse_fit_config(written, "test"), {edited}});
+  CHECK(stale.value_count == fit.value_count);
+  CHECK_THAT(std::string(test::remark_text(stale.remarks, "another_choice")),
+             Contains("the recording differs from the one that chose the law"));
+  CHECK_FALSE(test::has_remark(stale.remarks, "condition_of_choice"));
+  Json without = written;
+  without.at("choice").erase("samples_sha256");
+  const FitResult unknown =
+      fit_and_judge({parse_fit_config(without, "test"), {recording.recording}});
+  CHECK_THAT(std::string(test::remark_text(unknown.remarks, "another_choice")),
+             Contains("does not hold the SHA-256"));
+  CHECK_FALSE(test::has_remark(unknown.remarks, "condition_of_choice"));
   written.at("choice").at("samples") = fit.value_count + 1;
   const FitResult other = rerun();
   CHECK(test::has_remark(other.remarks, "another_choice"));

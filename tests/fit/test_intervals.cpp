@@ -191,9 +191,10 @@ TEST_CASE("a minimum that one start of five finds is not called identified", "[i
   mark_unconfirmed(fit, Confirmation{5, 2, std::nullopt});
   CHECK(verdict_text(fit.parameters[0]) == "identified");
   mark_unconfirmed(fit, Confirmation{5, 1, std::nullopt});
-  CHECK_THAT(verdict_text(fit.parameters[0]),
-             Contains("not identified: found by one start of 5: not identified until another start "
-                      "ends there (--starts 200"));
+  CHECK_THAT(
+      verdict_text(fit.parameters[0]),
+      Contains("not identified: found by one start of 5; another start has to end there, too "
+               "(--starts 200"));
   CHECK_THAT(fit.parameters[0].summary, !Contains("is identified"));
 }
 

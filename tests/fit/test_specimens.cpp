@@ -10,6 +10,7 @@
 #include "temp_folder.hpp"
 #include "tpm/base/random.hpp"
 #include "tpm/files/file.hpp"
+#include "tpm/fit/fitted_law.hpp"
 #include "tpm/fit/select/specimens.hpp"
 #include "tpm/fit/select/young_moduli.hpp"
 #include "tpm/fit/show/fit_report.hpp"
@@ -110,6 +111,29 @@ TEST_CASE("Recordings of one material to unequal depths show no spread", "[speci
   CHECK(json.at("recordings").at(0).at("fit").at("depth_reference_m") == study.law.reference);
   CHECK(json.at("pooled").at(0).contains("spread_p_value"));
   CHECK_THAT(to_terminal_text(*study.rows.front().fit), Contains("secants at a depth of " + shown));
+}
+
+TEST_CASE("A minimum that is not trusted is not pooled", "[specimens]") {
+  const auto recordings = one_material();
+  SpecimenStudy study =
+      study_specimens(recordings, parse_law_name("power-1", "test"), options_without_profiles());
+  const PooledParameter before = pooled(study, "k1");
+  FitResult& fit = study.rows.front().fit.value();
+  for (ParameterResult& p : fit.parameters) {
+    if (p.parameter.name == "k1") p.unconfirmed = Remark{"one_start", "found by one start of 5"};
+  }
+  const std::vector<PooledParameter> again = pool_specimens(study.rows, study.level);
+  for (const PooledParameter& p : again) {
+    CAPTURE(p.parameter.name);
+    const PooledParameter& all = pooled(study, p.parameter.name);
+    const int left = p.parameter.name == "k1" ? 1 : 0;
+    CHECK(p.left_out == all.left_out + left);
+    CHECK(p.effects.specimens == all.effects.specimens - left);
+  }
+  CHECK(before.effects.specimens == 5);
+  // law.json says the same, and what is predicted with it.
+  const LawFile law = fitted_law(fit);
+  CHECK(law.uncertainty.value().unconfirmed == std::vector<std::string>{"k1"});
 }
 
 TEST_CASE("A folder's stiffnesses under a probe are Young's moduli", "[specimens]") {

@@ -57,6 +57,7 @@ class Fits(unittest.TestCase):
             self.assertLessEqual(row.lower, row.with_drift_lower)
             self.assertGreaterEqual(row.upper, row.with_drift_upper)
         self.assertEqual(table.loc["k_inf", "not_separable"], "drift or a slow branch")
+        self.assertEqual(set(table.unconfirmed), {""})
         self.assertTrue(np.isnan(table.loc["offset", "with_drift"]))
 
     def test_placement_can_be_held(self):

@@ -33,6 +33,16 @@ class Judgements(unittest.TestCase):
         self.assertEqual(row.unit, "s")
         self.assertIn(row.summary, repr(pooled))
         self.assertIn(f"tau1 {row.typical:.5g} ({row.lower:.4g} .. {row.upper:.4g}) s: ", repr(pooled))
+        # The table says what the JSON says of each parameter.
+        for p in pooled.to_dict()["pooled"]:
+            row = pooled.pooled.loc[p["name"]]
+            self.assertEqual(row.identified, p["identified"])
+            self.assertEqual(row.only_if_described, p.get("only_if_described", False))
+            self.assertEqual(row.only_without, p.get("only_without", ""))
+        self.assertEqual(pooled.pooled.loc["k_inf", "only_without"], "drift or a slow branch")
+        spoilt = pooled.to_dict()
+        spoilt["pooled"][0].update({"identified": False, "only_if_described": True})
+        self.assertTrue(type(pooled)(spoilt).pooled.iloc[0].only_if_described)
         self.assertEqual(pooled.adequacy["verdict"], "not_judged")  # nothing rests before contact
         self.assertEqual(len(pooled.adequacy["not_judged"]), 3)
         for words in (pooled.adequacy["summary"], *pooled.warnings):

@@ -124,14 +124,15 @@ class Fit:
         Columns: estimate, standard_error (linearised), lower and upper (limits by profile likelihood; NaN
         where the data give none), unit, verdict, nuisance (belongs to the recording), only_if_described (the
         law does not describe the data: the row holds only if it did), not_separable (what the recording cannot
-        tell it from; empty: nothing), with_drift, with_drift_lower, with_drift_upper (estimate and limits of the
-        fit with a drift of the zero, where no rest tells one: lower and upper hold these limits, too; else NaN),
-        summary.
+        tell it from; empty: nothing), unconfirmed (why its minimum is not trusted; empty: it is), with_drift,
+        with_drift_lower, with_drift_upper (estimate and limits of the fit with a drift of the zero, where no
+        rest tells one: lower and upper hold these limits, too; else NaN), summary.
         """
         import pandas as pd
 
         columns = ["name", "estimate", "standard_error", "lower", "upper", "unit", "verdict", "nuisance",
-                   "only_if_described", "not_separable", "with_drift", "with_drift_lower", "with_drift_upper", "summary"]
+                   "only_if_described", "not_separable", "unconfirmed", "with_drift", "with_drift_lower",
+                   "with_drift_upper", "summary"]
         table = pd.DataFrame(self._core.parameters, columns=columns).set_index("name")
         numbers = ["estimate", "standard_error", "lower", "upper", "with_drift", "with_drift_lower", "with_drift_upper"]
         table[numbers] = table[numbers].astype(float)

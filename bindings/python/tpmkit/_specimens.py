@@ -28,14 +28,18 @@ class Specimens:
     @property
     def pooled(self) -> pd.DataFrame:
         """One row per material parameter, by name, SI: typical, lower, upper, unit, specimens, left_out, identified,
-        i_squared, summary."""
+        only_if_described (the law does not describe all recordings: the row holds only if it did), only_without (what
+        no recording tells it from; empty: nothing), i_squared, summary."""
         import pandas as pd
 
         rows = []
         for p in self._document["pooled"]:
             lower, upper = p.get("interval_SI") or (None, None)
             rows.append({"name": p["name"], "typical": p.get("typical_SI"), "lower": lower, "upper": upper,
-                         **{k: p.get(k) for k in ("unit", "specimens", "left_out", "identified", "i_squared", "summary")}})
+                         "unit": p["unit"], "specimens": p["specimens"], "left_out": p["left_out"],
+                         "identified": p["identified"], "only_if_described": p.get("only_if_described", False),
+                         "only_without": p.get("only_without", ""), "i_squared": p.get("i_squared"),
+                         "summary": p["summary"]})
         table = pd.DataFrame(rows).set_index("name")
         for column in ("typical", "lower", "upper"):
             table[column] = table[column].astype(float)

@@ -115,6 +115,7 @@ class Finder {
     find_contact();
     find_creep();
     find_detachments();
+    tell_zero_from_preload();
     for (Phase& phase : found_.phases) {
       phase.mean_rate = mean_rate(time_, drive_, phase);
       phase.typical_rate = typical_rate(time_, drive_, phase);
@@ -317,6 +318,30 @@ class Finder {
       relabel(done, end, PhaseKind::recovery);
       return;
     }
+  }
+
+  /// A force at rest that rises with the first movement is a preload or the error of the zero. If
+  /// the probe is withdrawn clear of where it rested and the force stands there as it did at rest,
+  /// it is the zero: the rest was in the air, and contact began with the movement.
+  void tell_zero_from_preload() {
+    constexpr double kClear = 0.1;  // of the travel
+    constexpr std::size_t kFewest = 8;
+    if (!found_.preloaded) return;
+    const double travel = found_.peak_drive - drive_.front();
+    const double clear = drive_.front() - kClear * travel;
+    const auto deepest = std::ranges::max_element(drive_);
+    std::vector<double> withdrawn;
+    for (auto i = static_cast<std::size_t>(deepest - drive_.begin()); i < drive_.size(); ++i) {
+      if (drive_[i] <= clear) withdrawn.push_back(level_[i]);
+    }
+    if (withdrawn.size() < kFewest) return;
+    // The first half may still recover, or be pulled.
+    withdrawn.erase(withdrawn.begin(),
+                    withdrawn.begin() + static_cast<std::ptrdiff_t>(withdrawn.size() / 2));
+    const double apart = std::abs(median(std::move(withdrawn)) - found_.floor_response);
+    if (apart > 0.5 * touch_margin(search())) return;
+    found_.preloaded = false;
+    relabel(0, found_.contact_index, PhaseKind::before_contact);
   }
 
   /// Without digits that are only jitter.

@@ -22,6 +22,18 @@ bool is_nuisance(const FitConfig& config, std::size_t parameter) {
                      [&](const Target& target) { return table[target.parameter].nuisance; });
 }
 
+bool is_contact_under_load(const FitConfig& config, std::size_t parameter) {
+  if (!config.law || config.law->drive != Quantity::indentation_depth) return false;
+  const std::vector<LawParameter> table = law_parameters(*config.law);
+  return std::ranges::any_of(config.parameters[parameter].sets, [&](const Target& target) {
+    if (table[target.parameter].name != "contact") return false;
+    for (std::size_t i = 0; i < config.data.size(); ++i) {
+      if (config.data[i].load_imposed && target.applies_to(i)) return true;
+    }
+    return false;
+  });
+}
+
 namespace {
 
 constexpr int kReadableDigits = 4;
@@ -140,6 +152,37 @@ std::string bound_flag(const FitResult& result, const ParameterResult& nuisance)
   return fmt::format("{}: what is said of {} holds only there", where, fmt::join(names, ", "));
 }
 
+/// Where the best fit ends on a bound of the contact under an imposed force, the recording does not
+/// determine it, nor what depends on it.
+/// @return what a reader must know
+Remark say_undetermined(FitResult& result, const ParameterResult& contact) {
+  const bool upper = contact.at_upper_bound;
+  const FitParameter& f = contact.parameter;
+  const std::string where = fmt::format("its {} bound {}", upper ? "upper" : "lower",
+                                        in_sized_unit(contact, upper ? f.upper : f.lower));
+  std::vector<std::string> names;
+  for (ParameterResult& p : result.parameters) {
+    const bool depends = std::ranges::any_of(p.conditional_on, [&](const Condition& c) {
+      return c.at_estimate && c.parameter == f.name;
+    });
+    if (!depends) continue;
+    names.push_back(p.parameter.name);
+    if (p.unconfirmed) continue;
+    p.unconfirmed = Remark{"contact_undetermined",
+                           fmt::format("{} is undetermined (the fit ends on {})", f.name, where)};
+    p.summary = parameter_words(p, result.config.level);
+  }
+  return {
+      "contact_undetermined",
+      fmt::format("{} is undetermined by this recording: the fit ends on {}, {}{}", f.name, where,
+                  upper ? "the shallowest reading under a load"
+                        : "the furthest that the instrument can have come from without a load",
+                  names.empty() ? std::string("; no other parameter depends on it")
+                                : fmt::format("; not identified: {}; --contact holds a known "
+                                              "depth",
+                                              fmt::join(names, ", ")))};
+}
+
 std::string condition_words(const ParameterResult& p, const std::vector<ParameterResult>& all) {
   std::string words;
   for (const Condition& c : p.conditional_on) {
@@ -227,12 +270,22 @@ void mark_conditions(FitResult& result, const ResidualFunction& function) {
       add_condition(all[i], condition_of(nuisance, bound.upper, false));
     }
   }
+  std::vector<Remark> undetermined(all.size());
+  for (std::size_t i = 0; i < all.size(); ++i) {
+    if (!is_contact_under_load(result.config, i)) continue;
+    if (all[i].at_lower_bound || all[i].at_upper_bound) {
+      undetermined[i] = say_undetermined(result, all[i]);
+    }
+  }
   for (ParameterResult& p : all) p.summary += condition_words(p, all);
-  for (const ParameterResult& p : all) {
+  for (std::size_t i = 0; i < all.size(); ++i) {
+    const ParameterResult& p = all[i];
     if (p.first_bounds) {
       result.remarks.push_back({"bounds_widened", widening_words(p)});
     }
-    if (p.nuisance && (p.at_lower_bound || p.at_upper_bound)) {
+    if (!undetermined[i].code.empty()) {
+      result.remarks.push_back(std::move(undetermined[i]));
+    } else if (p.nuisance && (p.at_lower_bound || p.at_upper_bound)) {
       result.remarks.push_back({"nuisance_at_bound", bound_flag(result, p)});
     }
   }

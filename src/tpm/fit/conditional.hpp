@@ -9,6 +9,10 @@ namespace tpm::fit {
 /// error, size of the noise) and not to the material.
 [[nodiscard]] bool is_nuisance(const FitConfig& config, std::size_t parameter);
 
+/// True for the depth of contact under an imposed force. No rest measures it, unlike that under an
+/// imposed depth: on a bound it is undetermined.
+[[nodiscard]] bool is_contact_under_load(const FitConfig& config, std::size_t parameter);
+
 /// Moves automatic bounds (EstimatedParameter::widest) out that the fit presses on: where the
 /// estimate stands on one, or where one of a nuisance parameter cuts another parameter's interval.
 /// Each time the distance from the start is doubled (on a log scale: ten times as far).

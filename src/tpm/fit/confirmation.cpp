@@ -51,8 +51,8 @@ void mark_unconfirmed(FitResult& result, const Confirmation& confirmation) {
     if (p.verdict == Verdict::failed || p.verdict == Verdict::flat) continue;
     p.unconfirmed = Remark{
         "one_start",
-        fmt::format("found by one start of {}: not identified until another start ends there "
-                    "(--starts {}, or a law of fewer parameters)",
+        fmt::format("found by one start of {}; another start has to end there, too (--starts {}, "
+                    "or a law of fewer parameters)",
                     confirmation.starts, std::max(kFewest, kTimes * confirmation.starts))};
     p.summary = parameter_words(p, result.config.level);
   }

@@ -55,8 +55,8 @@ struct ParameterResult {
   Verdict verdict = Verdict::not_profiled;
   /// The law does not describe the data: estimate, interval and verdict hold only if it did.
   bool only_if_described = false;
-  /// Why the minimum itself is not trusted ("found by one start of 5", and what to do); it is then
-  /// not identified, whatever its profile says.
+  /// Why the minimum itself is not trusted ("found by one start of 5", "contact is undetermined");
+  /// it is then not identified, whatever its profile says.
   std::optional<Remark> unconfirmed;
   std::string summary;  ///< one sentence
   Profile profile;

@@ -139,7 +139,7 @@ std::string range_words(const ParameterResult& p, double level) {
             in_sized_unit(p, p.estimate), p.not_separable, percent(level), interval);
       }
       if (p.unconfirmed) {
-        return fmt::format("{} = {}, {}; {} interval of this minimum {}", f.name,
+        return fmt::format("{} = {} is not identified: {}; {} interval of this minimum {}", f.name,
                            in_sized_unit(p, p.estimate), p.unconfirmed->text, percent(level),
                            interval);
       }

@@ -182,7 +182,9 @@ const Block<UncertaintyKeys>& uncertainty_block() {
                    "estimated parameters on a bound: fixed there")),
        of_rest(key("not_separable", &U::not_separable, list(text()),
                    "estimated parameters that the recordings cannot tell from a drift or a slow "
-                   "branch"))},
+                   "branch")),
+       of_rest(key("unconfirmed", &U::unconfirmed, list(text()),
+                   "estimated parameters whose minimum is not trusted: not identified"))},
       {{"a confidence level below 1", [](const K& keys) -> std::optional<Fault> {
           if (keys.rest.level < 1.0) return std::nullopt;
           return Fault{"level", "is 1"};
@@ -273,6 +275,7 @@ Json files::to_json(const LawUncertainty& uncertainty, const LawSpec& spec) {
   if (uncertainty.duration_s > 0.0) json["duration_s"] = uncertainty.duration_s;
   if (!uncertainty.at_bound.empty()) json["at_bound"] = uncertainty.at_bound;
   if (!uncertainty.not_separable.empty()) json["not_separable"] = uncertainty.not_separable;
+  if (!uncertainty.unconfirmed.empty()) json["unconfirmed"] = uncertainty.unconfirmed;
   return json;
 }
 

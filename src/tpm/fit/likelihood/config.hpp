@@ -142,8 +142,9 @@ struct Hypothesis {
 
 /// Conditions under which a law was chosen among others, for the fits of its configuration.
 struct LawChoice {
-  std::string law;                           ///< that was chosen
-  int samples = 0;                           ///< fitted
+  std::string law;                               ///< that was chosen
+  int samples = 0;                               ///< fitted
+  std::vector<std::string> samples_sha256 = {};  ///< of the readings of each data set
   std::string better = {};                   ///< law that the data prefer decisively; empty: none
   double better_by = 0.0;                    ///< in BIC
   std::string not_described = {};            ///< what was said where it does not describe the data
@@ -174,7 +175,7 @@ struct FitConfig {
   bool profiles = true;
   std::optional<BootstrapOptions> bootstrap;
   std::vector<Hypothesis> hypotheses;
-  std::optional<LawChoice> choice;  ///< decides nothing: the fit says it again (state_choice)
+  std::optional<LawChoice> choice;  ///< decides nothing: the fit says it again (repeat_choice)
   std::filesystem::path folder;     ///< where relative paths of data sets are looked up
   /// Asked before each evaluation; true ends the fit with Interrupted. Not part of the result.
   std::function<bool()> interrupted;

@@ -190,10 +190,12 @@ const Block<LawChoice>& choice_block() {
   using C = LawChoice;
   static const Block<C> block(
       "fit_choice",
-      "conditions under which the law was chosen among others, which a fit of the same law to as "
-      "many samples says again",
+      "conditions under which the law was chosen among others, which a fit of the same law to the "
+      "same readings says again",
       {required(key("law", &C::law, text(1), "that was chosen")),
        required(key("samples", &C::samples, whole<int>(0, 1e9), "that were fitted")),
+       key("samples_sha256", &C::samples_sha256, list(text_if_any()),
+           "SHA-256 of the numbers of each data set; without it nothing is said again"),
        key("better", &C::better, text(1), "law that the data prefer decisively"),
        key("better_by", &C::better_by, number({.least = 0.0}), "in BIC"),
        key("not_described", &C::not_described, text(1),

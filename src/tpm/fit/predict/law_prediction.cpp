@@ -220,6 +220,13 @@ void add_range_remarks(LawPrediction& p, const LawFile& law) {
                                               "bands suppose that nothing drifted",
                                               name)});
     }
+    for (const std::string& name : law.uncertainty->unconfirmed) {
+      p.remarks.push_back(
+          {"parameter_unconfirmed",
+           fmt::format("{} was not identified: the minimum of the fit is not trusted, and the "
+                       "bands suppose it",
+                       name)});
+    }
   }
   const auto missing = std::count_if(p.response.begin(), p.response.end(),
                                      [](double f) { return !std::isfinite(f); });

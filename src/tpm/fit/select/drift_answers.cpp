@@ -57,7 +57,7 @@ void hold_both(ParameterResult& p, const ParameterResult* other, const std::stri
     });
     return;
   }
-  if (p.verdict == Verdict::flat || p.verdict == Verdict::failed) return;
+  if (p.verdict == Verdict::flat || p.verdict == Verdict::failed || p.unconfirmed) return;
   change_and_say(p, level, [&] { p.not_separable = doubt; });
 }
 

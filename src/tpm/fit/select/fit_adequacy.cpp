@@ -14,6 +14,7 @@
 #include "tpm/fit/adequacy.hpp"
 #include "tpm/fit/likelihood/load_imposed.hpp"
 #include "tpm/fit/select/configuration_remarks.hpp"
+#include "tpm/fit/select/law_choice.hpp"
 #include "tpm/fit/verdict.hpp"
 
 namespace tpm::fit {
@@ -329,39 +330,6 @@ void state_of_rests(Selection& s, std::span<const PreparedRecording> recordings)
   chosen.reason = "does not describe the data";
 }
 
-/// That another law does better decisively.
-void state_better(FitResult& fit, const std::string& law, const std::string& better, double by) {
-  LawAdequacy adequacy = fit.adequacy.value_or(LawAdequacy{});
-  adequacy.verdict = described_name(Described::not_described);
-  adequacy.summary = fmt::format("{} does not describe these data: {} does better, by {} in BIC",
-                                 law, better, significant(by, 3));
-  state(fit, std::move(adequacy));
-}
-
-/// What was known when the law of the configuration was chosen, unless the law or the number of
-/// samples is another one since.
-void state_choice(FitResult& fit) {
-  if (!fit.config.choice) return;
-  const LawChoice& choice = *fit.config.choice;
-  const std::string law = fit.config.law ? law_name(*fit.config.law) : fit.config.model;
-  if (law != choice.law || fit.value_count != choice.samples) {
-    fit.remarks.push_back(
-        {"another_choice",
-         fmt::format("the choice of {} from {} samples, which the configuration holds, is not "
-                     "repeated: this is {} with {} samples",
-                     choice.law, choice.samples, law, fit.value_count)});
-    return;
-  }
-  const bool rejected = fit.adequacy && fit.adequacy->is_rejected();
-  if (rejected && !choice.not_described.empty()) fit.adequacy->summary = choice.not_described;
-  if (!choice.better.empty() && !rejected) {
-    state_better(fit, law, choice.better, choice.better_by);
-  }
-  for (const std::string& words : choice.conditions) {
-    fit.remarks.push_back({"condition_of_choice", words});
-  }
-}
-
 /// Sizes of the residuals of the first unloading behind the fitted part, down to the drive at which
 /// that part begins.
 std::vector<double> unloading_of(const RecordingFit& r) {
@@ -397,6 +365,14 @@ void state_hysteresis(Selection& s) {
 }
 
 }  // namespace
+
+void state_better(FitResult& fit, const std::string& law, const std::string& better, double by) {
+  LawAdequacy adequacy = fit.adequacy.value_or(LawAdequacy{});
+  adequacy.verdict = described_name(Described::not_described);
+  adequacy.summary = fmt::format("{} does not describe these data: {} does better, by {} in BIC",
+                                 law, better, significant(by, 3));
+  state(fit, std::move(adequacy));
+}
 
 std::string hysteresis_of(const FitResult& fit) {
   constexpr std::size_t kFewest = 8;
@@ -449,24 +425,6 @@ void state_preferred(Selection& s) {
   chosen.reason = "does not describe the data";
 }
 
-void keep_choice(Selection& s) {
-  Candidate& chosen = s.candidates[s.recommended];
-  LawChoice choice{.law = law_name(chosen.law), .samples = chosen.fit.value_count};
-  if (s.preferred) {
-    choice.better = law_name(s.candidates[*s.preferred].law);
-    choice.better_by = chosen.delta_bic;
-  }
-  const std::string adequacy = chosen.fit.adequacy ? chosen.fit.adequacy->summary : std::string();
-  if (chosen.fit.adequacy && chosen.fit.adequacy->is_rejected()) choice.not_described = adequacy;
-  // The sentence that recommends the law is a condition only where it says more than that.
-  const bool plain = s.candidates.size() == 1 || (chosen.identified && !s.preferred);
-  for (std::size_t i = 0; i < s.summary.size(); ++i) {
-    if (s.summary[i] == adequacy || (plain && i == s.recommendation)) continue;
-    choice.conditions.push_back(s.summary[i]);
-  }
-  chosen.fit.config.choice = std::move(choice);
-}
-
 void state_adequacy(Selection& s, std::span<const PreparedRecording> recordings) {
   state_of_rests(s, recordings);
   state_preferred(s);
@@ -494,7 +452,7 @@ FitResult fit_and_judge(const FitProblem& problem) {
   FitResult fit = run_fit(problem.config, data);
   give_both_drift_answers(fit, data);
   state_adequacy(fit, data);
-  state_choice(fit);
+  repeat_choice(fit);
   std::vector<Remark> remarks = configuration_remarks(fit, data, problem.data.empty());
   fit.remarks.insert(fit.remarks.begin(), std::make_move_iterator(remarks.begin()),
                      std::make_move_iterator(remarks.end()));

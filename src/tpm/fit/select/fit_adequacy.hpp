@@ -24,9 +24,9 @@ void state_adequacy(Selection& s, std::span<const PreparedRecording> recordings)
 /// not describe them, whatever its residual is beside the noise.
 void state_preferred(Selection& s);
 
-/// Keeps the conditions of a choice among laws in the configuration of the chosen fit, once its
-/// summary is complete: a fit of the written configuration says them again.
-void keep_choice(Selection& s);
+/// States that another law does better decisively: the fitted one does not describe the data.
+/// @param by in BIC
+void state_better(FitResult& fit, const std::string& law, const std::string& better, double by);
 
 /// The same as state_adequacy() for one fit.
 /// @param recordings those that were fitted, in the order of the fit's data

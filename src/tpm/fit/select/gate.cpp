@@ -7,6 +7,7 @@
 #include <utility>
 
 #include "tpm/base/text.hpp"
+#include "tpm/fit/conditional.hpp"
 #include "tpm/fit/select/fit_adequacy.hpp"
 #include "tpm/fit/verdict.hpp"
 
@@ -72,7 +73,13 @@ Refusal refusal_of(const Candidate& candidate, const ProtocolSpans& spans) {
     if (first.reason.empty()) first = std::move(refusal);
   };
   const auto table = law_parameters(candidate.fit.config.law.value());
-  for (const ParameterResult& p : candidate.fit.parameters) {
+  for (std::size_t i = 0; i < candidate.fit.parameters.size(); ++i) {
+    const ParameterResult& p = candidate.fit.parameters[i];
+    const bool on_bound = p.at_lower_bound || p.at_upper_bound;
+    if (p.nuisance && on_bound && is_contact_under_load(candidate.fit.config, i)) {
+      return {fmt::format("{} ends at its {} bound: undetermined", p.parameter.name,
+                          p.at_lower_bound ? "lower" : "upper")};
+    }
     const LawParameter* law = material_parameter(table, p.parameter.name);
     if (law == nullptr) continue;
     if (is_dashpot(p)) continue;
@@ -88,6 +95,7 @@ Refusal refusal_of(const Candidate& candidate, const ProtocolSpans& spans) {
       return {fmt::format("{} ends at its {} bound, and {} depends on it", c.parameter,
                           c.upper ? "upper" : "lower", p.parameter.name)};
     }
+    if (p.unconfirmed) return {fmt::format("{}: {}", p.parameter.name, p.unconfirmed->text)};
     // An interval says more than the standard error, and stands in the table of the parameters.
     const bool has_interval = p.verdict == Verdict::identified || p.verdict == Verdict::lower_only;
     if (!p.standard_error && !has_interval) {
@@ -159,7 +167,10 @@ void judge_identified(Candidate& candidate, const ProtocolSpans& spans) {
 }
 
 void reassess(Candidate& chosen, const ProtocolSpans& spans) {
-  if (!chosen.identified) judge_identified(chosen, spans);
+  // Profiles show a minimum that is not trusted; nothing else that they show speaks against a law.
+  const bool doubtful = std::ranges::any_of(
+      chosen.fit.parameters, [](const ParameterResult& p) { return p.unconfirmed.has_value(); });
+  if (!chosen.identified || doubtful) judge_identified(chosen, spans);
 }
 
 void settle_choice(Selection& s, const ProtocolSpans& spans, const ProfiledFit& with_profiles) {
@@ -176,6 +187,13 @@ void settle_choice(Selection& s, const ProtocolSpans& spans, const ProfiledFit& 
     if (!next) break;
     profile(*next);
     s.recommended = least_within(s.candidates, s.margin);
+  }
+  // A law that its profiles no longer call identified gives way to the next one.
+  for (int tried = 0; tried < kMostTried; ++tried) {
+    profile(s.recommended);
+    const std::size_t next = least_within(s.candidates, s.margin);
+    if (next == s.recommended) break;
+    s.recommended = next;
   }
   profile(s.recommended);
   s.preferred.reset();

@@ -199,15 +199,19 @@ std::optional<Remark> imposed_channel_remark(const std::string& name, const Reco
   const std::string load(load_word(as_read));
   const std::string answer(answer_word(as_read));
   const std::string& taken = load_imposed ? load : answer;
+  const std::string held = fmt::format("it was held while the {} went on: creep", answer);
+  const bool creeps = !load_imposed && crept(c->load, c->answer, c->answer_noise);
   return Remark{
       load_imposed ? "load_imposed" : "both_channels_noisy",
       fmt::format(
           "{}: {}; noise is {} % of the range of the {} and {} % of that of the {}. The fit "
           "takes the {} as exact{}",
           name,
-          load_imposed ? fmt::format("the {} was imposed (it was held while the {} went on: creep)",
-                                     load, answer)
-                       : "both channels are noisy",
+          load_imposed ? fmt::format("the {} was imposed ({})", load, held)
+          : creeps     ? fmt::format("both channels are noisy, and the {} is too noisy to be taken "
+                                         "as imposed ({})",
+                                     load, held)
+                       : std::string("both channels are noisy"),
           significant(100.0 * c->of_answer(), 2), answer, significant(100.0 * c->of_load(), 2),
           load, taken,
           both_noisy

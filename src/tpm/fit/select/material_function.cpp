@@ -13,6 +13,7 @@
 #include "tpm/fit/select/fixed_times.hpp"
 #include "tpm/fit/select/function_starts.hpp"
 #include "tpm/fit/select/gate.hpp"
+#include "tpm/fit/select/law_choice.hpp"
 #include "tpm/fit/verdict.hpp"
 #include "tpm/work/progress.hpp"
 #include "tpmkit/error.hpp"

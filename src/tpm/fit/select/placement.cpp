@@ -11,6 +11,7 @@
 #include "tpm/fit/adequacy.hpp"
 #include "tpm/fit/autoregressive.hpp"
 #include "tpm/fit/likelihood/load_imposed.hpp"
+#include "tpm/fit/select/pull_after_withdrawal.hpp"
 
 namespace tpm::fit {
 namespace {
@@ -341,7 +342,15 @@ RestEstimate estimate_rests(const PreparedRecording& recording) {
   RestEstimate estimate;
   RestReadings& result = estimate.readings;
   const double rounding = rounding_sd(recording);
-  const RestSamples all = without_recovery(rest_samples(recording), rounding);
+  RestSamples all = without_recovery(rest_samples(recording), rounding);
+  const std::span<const double> time = all.time_s, reading = all.reading;
+  result.pulled = is_pulled_after({time.first(all.before), reading.first(all.before)},
+                                  {time.subspan(all.before), reading.subspan(all.before)});
+  if (result.pulled) {
+    all.time_s.resize(all.before);
+    all.reading.resize(all.before);
+    all.after = 0;
+  }
   result.before = all.before;
   result.after = all.after;
   if (all.reading.empty() || (all.before == 0 && all.after < kFewestForSlope)) return estimate;

@@ -27,6 +27,7 @@ struct RestReadings {
   std::optional<Measured> zero;       ///< of the response, at origin_s; none without samples before
                                       ///< contact
   std::optional<Measured> drift;      ///< of the zero, per second; none below 8 samples
+  bool pulled = false;                ///< after withdrawal (is_pulled_after): `after` is 0
 };
 
 /// Zero and drift from the rests of an indentation, by generalised least squares of a straight line

@@ -94,7 +94,40 @@ AutomaticBounds offset_bounds(const LawSpec& law, const PreparedRecording& r, st
   return bounds;
 }
 
-/// Strain without a load, or depth of contact, of creep: the load itself is taken as imposed.
+/// Depth of contact under an imposed force. Every reading under a load lies behind it; a probe that
+/// rested without a load had not passed it. Without such a rest the instrument may have come from
+/// as far as kFurthestContact times the largest depth that it read, and no further.
+AutomaticBounds contact_under_load_bounds(const LawSpec& law, const PreparedRecording& r,
+                                          std::string name) {
+  constexpr double kLoaded = 0.05;  // of the largest force, above the first one
+  constexpr double kSure = 4.0;     // standard deviations of a reading
+  const std::vector<double>& force = r.recording.drive;
+  const std::vector<double>& depth = r.recording.response;
+  const std::size_t rest = samples_before_load(r.recording);
+  const double zero = rest > 0 ? force.front() : 0.0;
+  const double loaded = zero + kLoaded * (r.phases.peak_drive - zero);
+  double shallowest = r.phases.peak_response;  // under a load
+  double travel = 0.0;
+  for (std::size_t i = rest; i < depth.size(); ++i) {
+    travel = std::max(travel, std::abs(depth[i]));
+    if (force[i] > loaded) shallowest = std::min(shallowest, depth[i]);
+  }
+  const double noise = kSure * r.phases.noise_sd_estimate;
+  FitParameter fit;
+  fit.name = std::move(name);
+  fit.scale = Scale::linear;
+  fit.unit = shown_unit(quantity_dimension(law.drive));
+  fit.upper = shallowest + noise;
+  fit.lower = shallowest - kFurthestContact * travel;
+  if (rest > 0) {
+    const auto end = depth.begin() + static_cast<std::ptrdiff_t>(rest);
+    fit.lower = std::min(*std::min_element(depth.begin(), end), shallowest) - noise;
+  }
+  fit.start = std::clamp(r.phases.floor_response, fit.lower, fit.upper);
+  return {readable(std::move(fit)), std::nullopt};
+}
+
+/// Strain without a load of creep: the load itself is taken as imposed.
 AutomaticBounds strain_zero_bounds(const LawSpec& law, const PreparedRecording& r,
                                    std::string name) {
   constexpr double kFurther = 10.0;
@@ -107,8 +140,12 @@ AutomaticBounds strain_zero_bounds(const LawSpec& law, const PreparedRecording& 
 Prior zero_prior(const PreparedRecording& r, const RestReadings& rests) {
   constexpr double kStated = 0.02;  // of the peak
   if (rests.zero) {
+    const char* pulled = rests.pulled
+                             ? "; those after withdrawal are left out: they lie lower than "
+                               "a drift explains, as if tissue still pulled the probe"
+                             : "";
     return {rests.zero->value, rests.zero->sd,
-            rests.before > 0 ? fmt::format("{} samples before contact", rests.before)
+            rests.before > 0 ? fmt::format("{} samples before contact{}", rests.before, pulled)
                              : fmt::format("{} samples after withdrawal", rests.after)};
   }
   if (r.instrument && r.instrument->zero && *r.instrument->zero > 0.0) {
@@ -203,7 +240,9 @@ void add_free_placement(FitConfig& config, const LawModel& model, const Prepared
                         const SetupOptions& options) {
   const LawSpec& law = model.spec();
   if (r.load_imposed) {
-    add_automatic(config, strain_zero_bounds(law, r, std::move(offset)),
+    add_automatic(config,
+                  is_indentation(law) ? contact_under_load_bounds(law, r, std::move(offset))
+                                      : strain_zero_bounds(law, r, std::move(offset)),
                   {{model.index("contact"), scope}});
     if (options.measured) take_level_before_load(config, r);
     return;

@@ -436,6 +436,7 @@ Json config_json(const FitConfig& config) {
   if (!config.choice) return j;
   const LawChoice& choice = *config.choice;
   j["choice"] = {{"law", choice.law}, {"samples", choice.samples}};
+  if (!choice.samples_sha256.empty()) j["choice"]["samples_sha256"] = choice.samples_sha256;
   if (!choice.better.empty()) {
     j["choice"]["better"] = choice.better;
     j["choice"]["better_by"] = choice.better_by;

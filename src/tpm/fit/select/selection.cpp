@@ -13,6 +13,7 @@
 #include "tpm/fit/select/channel_cause.hpp"
 #include "tpm/fit/select/fit_adequacy.hpp"
 #include "tpm/fit/select/gate.hpp"
+#include "tpm/fit/select/law_choice.hpp"
 #include "tpm/fit/select/placement.hpp"
 #include "tpm/fit/select/recording_setup.hpp"
 #include "tpm/fit/select/unseen_rises.hpp"

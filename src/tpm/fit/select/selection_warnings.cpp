@@ -146,6 +146,18 @@ std::vector<Remark> protocol_remarks(const FitResult& fit,
   if (hold_s == 0.0) {
     remarks.push_back({"no_hold", "there is no hold: relaxation is seen only through the ramp"});
   }
+  for (const PreparedRecording& r : recordings) {
+    if (!r.phases.preloaded || r.load_imposed) continue;
+    const Unit unit = shown_unit(quantity_dimension(r.recording.response_quantity));
+    remarks.push_back(
+        {"rest_or_preload",
+         fmt::format("{}: {} stands at rest and rises with the first movement: a preload, or the "
+                     "zero of the force cell in the air; this recording does not tell which. Zero "
+                     "and contact have wide priors; a rest before contact, or one withdrawn clear "
+                     "of it, tells",
+                     r.name,
+                     with_unit(significant(r.phases.floor_response / unit.to_si, 3), unit))});
+  }
   constexpr int kDigitsOfTime = 6;  // of a rounded one: "310 s", not "3.1e+02 s"
   for (const ParameterResult& p : fit.parameters) {
     // A delay of a rise is no time constant.

@@ -209,7 +209,7 @@ ParameterEstimates parameter_estimates(std::span<const SpecimenRow> rows, const 
     if (!row.fit) continue;
     const ParameterResult& r = row.parameter(i);
     const bool usable = r.standard_error && !r.at_lower_bound && !r.at_upper_bound &&
-                        r.conditional_on.empty() &&
+                        r.conditional_on.empty() && !r.unconfirmed &&
                         (parameter.scale == Scale::linear || r.estimate > 0.0);
     if (!usable) {
       ++found.left_out;

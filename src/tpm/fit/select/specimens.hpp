@@ -31,7 +31,8 @@ struct PooledParameter {
   FitParameter parameter;
   RandomEffects effects;  ///< in theta
   int left_out = 0;       ///< recordings that do not determine it: it is at a bound, depends on a
-                          ///< nuisance parameter at one, or the fit is of no full rank
+                          ///< nuisance parameter at one, its minimum is not trusted, or the fit is
+                          ///< of no full rank
   int not_separable = 0;  ///< recordings that do not tell it from something else; left out, too,
                           ///< unless all are such
   /// All of them are such, and this is what they do not tell it from ("drift or a slow branch"):

@@ -8,8 +8,9 @@
 
 namespace tpm::fit {
 
-Tone tone_of(Verdict verdict) {
-  switch (verdict) {
+Tone tone_of(const ParameterResult& p) {
+  if (!p.not_separable.empty() || p.unconfirmed) return Tone::bad;
+  switch (p.verdict) {
     case Verdict::identified:
       return Tone::good;
     case Verdict::lower_only:

@@ -6,7 +6,7 @@
 
 namespace tpm::fit {
 
-[[nodiscard]] Tone tone_of(Verdict verdict);
+[[nodiscard]] Tone tone_of(const ParameterResult& p);
 
 /// A standardised residual beyond 2 is unusual, beyond 3 wrong.
 [[nodiscard]] Tone tone_of_residual(double standardised);

@@ -146,6 +146,9 @@ void add_law(ViewPage& page, const std::filesystem::path& file) {
     for (const std::string& parameter : u->not_separable) {
       page.fact("not separable from a drift", parameter);
     }
+    for (const std::string& parameter : u->unconfirmed) {
+      page.fact("not identified: minimum not trusted", parameter);
+    }
   }
   Json rows = Json::array();
   const std::vector<LawParameter> parameters = law_parameters(law.spec);

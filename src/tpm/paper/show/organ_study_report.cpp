@@ -167,7 +167,7 @@ Cell estimate_cell(const FitResult& fit, const ParameterResult& p) {
                                ? std::string()
                                : fmt::format(" (best {})", text(p.estimate));
   const std::string& symbol = p.parameter.unit.symbol;
-  const Tone tone = tone_of(p.verdict);
+  const Tone tone = tone_of(p);
   switch (p.verdict) {
     case Verdict::identified:
       return {best.empty() ? fmt::format("{} to {} {}", text(*p.lower), text(*p.upper), symbol)

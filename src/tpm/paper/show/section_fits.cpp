@@ -32,7 +32,7 @@ Table estimates_table(const FitResult& fit) {
                           {in_unit(p.parameter, p.estimate)},
                           {p.standard_error ? in_unit(p.parameter, *p.standard_error) : "-"},
                           {interval(p)},
-                          {verdict_text(p), tone_of(p.verdict)}});
+                          {verdict_text(p), tone_of(p)}});
   }
   return table;
 }
@@ -115,7 +115,7 @@ Table sensitivity_table(const FitStudy& study) {
   for (const FitVariant& v : study.variants) {
     std::vector<Cell> row = assumptions_of(v);
     for (const ParameterResult& p : v.result.parameters) {
-      row.push_back({estimate_and_interval(p), tone_of(p.verdict)});
+      row.push_back({estimate_and_interval(p), tone_of(p)});
     }
     row.push_back({significant(v.result.chi_square, 4)});
     table.rows.push_back(std::move(row));
