@@ -137,8 +137,12 @@ struct InnerSphere {
   int layer = 0;
 };
 
-InnerSphere inner_sphere(const Surface& surface, Eigen::Index point, const Vector3d& place) {
-  InnerSphere sphere{point, place, surface.nearest(place).position - place, 0.0, 0};
+/// @param part of the surface, near which the one before lay
+InnerSphere inner_sphere(const Surface& surface, Eigen::Index point, const Vector3d& place,
+                         int& part) {
+  constexpr double kAnywhere = std::numeric_limits<double>::infinity();
+  InnerSphere sphere{point, place, surface.nearest_of_moved(place, kAnywhere, part) - place, 0.0,
+                     0};
   sphere.depth = sphere.outwards.norm();
   return sphere;
 }
@@ -146,9 +150,10 @@ InnerSphere inner_sphere(const Surface& surface, Eigen::Index point, const Vecto
 /// All points, the deepest first.
 std::vector<InnerSphere> by_depth(const Surface& surface, const Positions& points) {
   std::vector<InnerSphere> inner(static_cast<std::size_t>(points.cols()));
+  int part = -1;
   for (std::size_t i = 0; i < inner.size(); ++i) {
     const auto point = static_cast<Eigen::Index>(i);
-    inner[i] = inner_sphere(surface, point, points.col(point));
+    inner[i] = inner_sphere(surface, point, points.col(point), part);
   }
   std::sort(inner.begin(), inner.end(), [](const InnerSphere& a, const InnerSphere& b) {
     return std::tuple(-a.depth, a.point) < std::tuple(-b.depth, b.point);
@@ -204,8 +209,9 @@ Positions shallow(const SolidFilling& filling) {
 }
 
 void add_inner(const Surface& surface, SolidFilling& filling, const Positions& added) {
+  int part = -1;
   for (Eigen::Index i = 0; i < added.cols(); ++i) {
-    filling.inner.push_back(inner_sphere(surface, filling.next_point++, added.col(i)));
+    filling.inner.push_back(inner_sphere(surface, filling.next_point++, added.col(i), part));
   }
 }
 
