@@ -3,6 +3,7 @@
 #include <cmath>
 
 #include "star_network.hpp"
+#include "tpm/organ/bonds/local_support.hpp"
 #include "tpm/organ/bonds/rigidity.hpp"
 #include "tpmkit/model.hpp"
 
@@ -56,4 +57,26 @@ TEST_CASE("the unguided star is a mechanism out of its plane, and says which sph
           "star.json: 1 zero-energy mode; loose: sphere 1 at (0, 0, 0) mm; expected"));
   constraints.slide(0, Eigen::Vector3d::UnitZ());
   CHECK(zero_energy_modes(bonds, network.organ.position, constraints).is_rigid());
+}
+
+TEST_CASE("one loose sphere is named in the singular") {
+  const TpmParameters p;
+  Network network = join(star_organ(p.spacing_m), Star::pairs(), {}, "star");
+  Constraints constraints(4);
+  for (const std::size_t i : {1, 2, 3}) {
+    const auto column = static_cast<Eigen::Index>(i);
+    if (network.organ.position(2, column) == 0.0) {
+      constraints.fix(i);
+      continue;
+    }
+    // The partner follows the contact; what it does along its own normal is no question.
+    constraints.slide(i, Eigen::Vector3d::UnitZ());
+    network.organ.normal.col(column) = Eigen::Vector3d::UnitX();
+  }
+  constraints.slide(0, Eigen::Vector3d::UnitZ());
+  const BondSystem bonds(network, p);
+  CHECK_THROWS_WITH(require_supported(bonds, network.organ, constraints, "star.json"),
+                    Catch::StartsWith("star.json: nearly a mechanism: 1 sphere is loose: sphere 1 "
+                                      "at (0, 0, 0) mm, held by its neighbours with less than 0.05 "
+                                      "of its bonds' stiffness (least "));
 }

@@ -84,6 +84,15 @@ TEST_CASE("pairs within a radius are those that brute force finds, in order") {
   CHECK_THROWS_WITH(pairs_within(points, -1.0), Contains("support radius: -1 m"));
 }
 
+TEST_CASE("pairs are found however far apart the groups of points lie") {
+  // More radii apart than a grid of cubes of that size can number.
+  Positions points = Positions::Zero(3, 6);
+  points.row(0) << 1.0, 0.0, 5e7, 5e7 + 1.0, 0.0, -5e7;
+  points.row(2) << 0.0, 0.5, 0.0, 0.0, 9e7, 0.0;
+  CHECK(pairs_within(points, 1.25) == std::vector<NeighbourPair>{{0, 1}, {2, 3}});
+  CHECK(pairs_within(points, 1.0) == std::vector<NeighbourPair>{{2, 3}});
+}
+
 TEST_CASE("a point exactly on the support radius is a neighbour") {
   Positions points = Positions::Zero(3, 3);
   points(0, 1) = 0.02;

@@ -70,6 +70,24 @@ TEST_CASE("a scene says what meets the tissue") {
   CHECK(driven.probes.size() == 1 + patch.size());
 }
 
+TEST_CASE("the protocol of a scene is whatever that of a contact may be") {
+  const std::string motion =
+      R"("protocol": {"kind": "sine", "depth": "2 mm", "frequency": "7 Hz", "cycles": 2})";
+  const ExperimentScene of_scene = experiment(R"({"organ": {"kind": "star"}, )" + motion + "}");
+  const ExperimentScene of_contact =
+      experiment(R"({"organ": {"kind": "star"}, "contacts": [{"kind": "sphere", )" +
+                 motion + "}]}");
+  const auto& knots = of_scene.protocol.knots();
+  REQUIRE(knots.size() == 129);
+  REQUIRE(of_contact.protocol.knots().size() == knots.size());
+  for (std::size_t i = 0; i < knots.size(); ++i) {
+    CHECK(knots[i].time_s == of_contact.protocol.knots()[i].time_s);
+    CHECK(knots[i].value == of_contact.protocol.knots()[i].value);
+  }
+  CHECK_THAT(of_scene.protocol.end_s(), WithinRel(2.0 / 7.0, 1e-12));
+  CHECK_THAT(knots[32].value, WithinRel(0.002, 1e-12));
+}
+
 TEST_CASE("a poked liver lets go of the tool and recovers", "[heavy]") {
   const SimulationRecord record = run_of(small_scene(kBall + kPoke)).record;
   const double peak = record.curve[33].response;

@@ -9,8 +9,10 @@
 #include <catch2/catch.hpp>
 #include <cmath>
 #include <numbers>
+#include <numeric>
 
 #include "organ_meshes.hpp"
+#include "pressed_ball.hpp"
 #include "solid_fillings.hpp"
 #include "tpm/organ/balance/equilibrium.hpp"
 #include "tpm/organ/body/liver_surface.hpp"
@@ -99,8 +101,6 @@ double pushed(Organ organ, double radius_m, const Vector3d& towards) {
 TEST_CASE("over twenty numbers of spheres no push on a ball is far softer than the others") {
   constexpr double kRadius_m = 0.05;
   const test::Sphere ball(kRadius_m);
-  const std::array<Vector3d, 5> pushes{
-      {{0.1, 0.2, 1.0}, {1.0, 0.1, -0.2}, {-0.3, 1.0, 0.4}, {-0.6, -0.5, 0.8}, {0.7, -0.6, -0.5}}};
   constexpr int kCounts = 20;
   for (int i = 0; i < kCounts; ++i) {
     const auto count = static_cast<std::size_t>(std::round(400.0 * std::pow(7.5, i / 19.0)));
@@ -111,13 +111,46 @@ TEST_CASE("over twenty numbers of spheres no push on a ball is far softer than t
       const std::vector<double> support = outer_support(build_network(organ, {}, "ball"));
       CHECK(*std::min_element(support.begin(), support.end()) >= kLeastOuterSupport);
       std::vector<double> stiffness;
-      for (const Vector3d& towards : pushes) {
+      for (const Vector3d& towards : test::kPushes) {
         stiffness.push_back(pushed(organ, kRadius_m, towards));
       }
       std::sort(stiffness.begin(), stiffness.end());
       CHECK(stiffness.front() >= 0.5 * stiffness[2]);
       CHECK(stiffness.back() <= 2.0 * stiffness.front());
     }
+  }
+}
+
+TEST_CASE("under an even pressure a filling is as uneven as its lattice, not more") {
+  // An fcc lattice is stiffest along its axes: the same ball of ever finer spheres differs by more
+  // than 1.2 over these places under the same disc, and no filling can do better.
+  constexpr double kRadius_m = 0.05;
+  const test::Sphere ball(kRadius_m);
+  const auto spread = [](const std::vector<double>& values) {
+    const auto [least, most] = std::minmax_element(values.begin(), values.end());
+    return *most / *least;
+  };
+  const std::vector<Eigen::Matrix3d> turns = test::turns();
+  for (const Lattice lattice : kLattices) {
+    INFO(entry_of(kLatticeWords, lattice).text);
+    const Organ organ = solid_of(ball, 1600, lattice);
+    const Organ fine = solid_of(ball, 8000, lattice);
+    const std::vector<double> disc_m{2.0 * organ.spacing};
+    std::vector<double> means, material;
+    for (const Vector3d& towards : test::kPushes) {
+      // Places that the lattice cannot tell from each other.
+      std::vector<double> alike;
+      for (std::size_t turn = 0; turn < turns.size(); turn += 3) {
+        alike.push_back(
+            test::pressed_on_discs(organ, kRadius_m, turns[turn] * towards, disc_m).front());
+      }
+      CHECK(spread(alike) < 1.2);
+      means.push_back(std::accumulate(alike.begin(), alike.end(), 0.0));
+      material.push_back(test::pressed_on_discs(fine, kRadius_m, towards, disc_m).front());
+    }
+    CHECK(std::abs(spread(means) / spread(material) - 1.0) < 0.05);
+    if (lattice == Lattice::fcc) CHECK(spread(material) > 1.2);
+    if (lattice != Lattice::fcc) CHECK(spread(means) < 1.2);
   }
 }
 

@@ -104,6 +104,26 @@ TEST_CASE("the nearest point is that of the nearest triangle, in a tree of any s
   }
 }
 
+TEST_CASE("the place of a point that moves is that of a new question, to the last bit") {
+  for (const TriangleMesh& mesh : {unit_cube(), round_cube(3), round_cube(40)}) {
+    const MeshSurface surface(closed_mesh(mesh, "mesh").mesh);
+    Random random(5);
+    Vector3d walker = surface.mesh().corner(0, 0);
+    int part = -1;
+    for (int i = 0; i < 300; ++i) {
+      // On the surface, close to it, and far inside, now and then in one leap.
+      const double step = i % 50 == 0 ? 1.0 : i % 3 == 0 ? 0.0 : 1e-3;
+      for (double& x : walker) x += step * random.normal();
+      const Vector3d expected = surface.nearest_position(walker, 10.0);
+      CHECK(surface.nearest_of_moved(walker, 10.0, part) == expected);
+      CHECK((part >= 0 && part < mesh.triangles.cols()));
+      if (i % 3 == 1) walker = expected;
+    }
+    int beyond = static_cast<int>(mesh.triangles.cols());
+    CHECK(surface.nearest_of_moved(walker, 10.0, beyond) == surface.nearest_position(walker, 10.0));
+  }
+}
+
 TEST_CASE("points are spread in proportion to area") {
   const MeshSurface cube(closed_mesh(unit_cube(), "cube").mesh);
   const Positions points = cube.spread(6000, 1);

@@ -441,8 +441,8 @@ std::shared_ptr<const SweepModel> organ_sweep_model(const SweepKeys& keys, std::
   }
   // Of the sweep, not of the scene; here where pointers find it.
   if (stepped) setup.scene[kIntegrator] = keys.integrator;
-  setup.protocol =
-      parse_protocol_block(setup.scene.at("protocol"), DocumentPlace{"scene"}, Openness::complete);
+  setup.protocol = parse_protocol_block(setup.scene.at("protocol"),
+                                        place.key("scene").key("protocol"), Openness::complete);
   setup.material = scene.tissue.materials.materials.front();
   setup.by_depth = scene.protocol.drive() == Drive::displacement;
   require_outputs(setup, place.key("outputs"));

@@ -29,8 +29,9 @@ int sweeps_for(std::size_t count) {
 
 /// Each point is pushed away from those nearer than the reach, then put back on the surface.
 /// @param near reaches as far
+/// @param parts of the surface on which the points lie
 void repel(const Surface& surface, double spacing, double step, NearPairs& near,
-           Positions& points) {
+           std::vector<int>& parts, Positions& points) {
   const double reach = kReach * spacing;
   Positions push = Positions::Zero(3, points.cols());
   for (const NeighbourPair& pair : near.of(points)) {
@@ -49,7 +50,8 @@ void repel(const Surface& surface, double spacing, double step, NearPairs& near,
   for_each_in_parallel(points.cols(), [&](Eigen::Index i) {
     // The point was on the surface, so that this is no farther away than it was pushed.
     const double within = push.col(i).norm() + kOnSurface * spacing;
-    points.col(i) = surface.nearest_position(points.col(i) + push.col(i), within);
+    points.col(i) = surface.nearest_of_moved(points.col(i) + push.col(i), within,
+                                             parts[static_cast<std::size_t>(i)]);
   });
 }
 
@@ -79,10 +81,11 @@ Positions even_points(const Surface& surface, std::size_t count, std::uint64_t s
   const double spacing = even_spacing(surface, count);
   const int sweeps = sweeps_for(count);
   NearPairs near(kReach * spacing);
+  std::vector<int> parts(count, -1);
   for (int sweep = 0; sweep < sweeps; ++sweep) {
     // Large steps first to even out the density, small ones at the end to settle.
     const double left = 1.0 - static_cast<double>(sweep) / sweeps;
-    repel(surface, spacing, 0.3 + 0.2 * left, near, points);
+    repel(surface, spacing, 0.3 + 0.2 * left, near, parts, points);
   }
   return points;
 }

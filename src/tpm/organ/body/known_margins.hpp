@@ -25,19 +25,18 @@ class KnownMargins {
     Eigen::Vector3d point;
     double depth = 0.0;  ///< below the surface, m
   };
-  /// The last that was asked in each cell of a grid.
-  struct Grid {
-    double cell = 0.0;  ///< m
-    std::unordered_map<std::uint64_t, Asked> asked;
-  };
-  static constexpr int kGrids = 4;
+  static constexpr std::size_t kGrids = 4;
+  using Cells = std::array<std::uint64_t, kGrids>;
 
-  [[nodiscard]] std::uint64_t cell_of(const Grid& grid, const Eigen::Vector3d& point) const;
+  /// The cell of a point in each grid, the coarsest first; each next one is half as wide.
+  [[nodiscard]] Cells cells_of(const Eigen::Vector3d& point) const;
 
   const Surface& surface_;
   Eigen::Vector3d corner_;
   double rounding_;
-  std::array<Grid, kGrids> grids_;
+  double finest_;  ///< cell, m
+  /// The last that was asked in each cell of a grid.
+  std::array<std::unordered_map<std::uint64_t, Asked>, kGrids> asked_;
 };
 
 }  // namespace tpm::organ

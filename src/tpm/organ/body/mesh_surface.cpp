@@ -113,6 +113,12 @@ Vector3d MeshSurface::nearest_position(const Vector3d& point, double within) con
   return tree_.nearest(point, within).position;
 }
 
+Vector3d MeshSurface::nearest_of_moved(const Vector3d& point, double within, int& part) const {
+  const TrianglePoint at = tree_.nearest_beside(point, within, part);
+  part = at.triangle;
+  return at.position;
+}
+
 double MeshSurface::signed_distance(const Vector3d& point) const {
   const TrianglePoint at = tree_.nearest(point);
   const double distance = std::sqrt(at.squared_distance);

@@ -15,7 +15,7 @@ struct NeighbourPair {
 };
 
 /// All pairs of points at a distance of at most `radius`, sorted by first and then second; found
-/// with a k-d tree in O(n log n) for a bounded number of neighbours.
+/// with a grid of cubes in O(n log n) for a bounded number of neighbours.
 /// @param points one finite point per column, m
 /// @param radius m, finite, above 0; Error(bad_input) otherwise
 [[nodiscard]] std::vector<NeighbourPair> pairs_within(const Positions& points, double radius);

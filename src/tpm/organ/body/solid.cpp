@@ -39,17 +39,19 @@ class DeepPoints {
   [[nodiscard]] std::size_t count(KnownMargins& known) const {
     std::size_t found = 0;
     rows([&](const Vector3d& point) { return known.margin(point, least_); },
-         [&](const Vector3d&, std::size_t length) { found += length; });
+         [&](const Vector3d&, std::size_t length, double) { found += length; });
     return found;
   }
 
-  [[nodiscard]] Positions collect() const {
+  /// @param depth of each, m, or less
+  [[nodiscard]] Positions collect(std::vector<double>& depth) const {
     std::vector<Vector3d> found;
     rows([&](const Vector3d& point) { return -surface_.signed_distance(point) - least_; },
-         [&](const Vector3d& first, std::size_t length) {
+         [&](const Vector3d& first, std::size_t length, double margin) {
            for (std::size_t s = 0; s < length; ++s) {
-             found.emplace_back(first.x() + stride() * static_cast<double>(s), first.y(),
-                                first.z());
+             const double along = stride() * static_cast<double>(s);
+             found.emplace_back(first.x() + along, first.y(), first.z());
+             depth.push_back(margin + least_ - along);
            }
          });
     Positions points(3, static_cast<Eigen::Index>(found.size()));
@@ -62,7 +64,7 @@ class DeepPoints {
  private:
   [[nodiscard]] double stride() const { return points_.cell() * points_.pitch(); }
 
-  /// Calls visit(first point, length) for stretches of deep points.
+  /// Calls visit(first point, length, its margin) for stretches of deep points.
   /// @param margin_of how much deeper than necessary a point is, m, or less with the same sign
   template <class Margin, class Visit>
   void rows(const Margin& margin_of, const Visit& visit) const {
@@ -87,7 +89,7 @@ class DeepPoints {
           std::min(last + 1 - s, static_cast<std::size_t>(std::abs(margin) / stride()) + 1);
       // Rounding must not decide for a neighbour exactly a margin away.
       const std::size_t sure = alike > 1 ? alike - 1 : 1;
-      if (margin >= 0.0) visit(point, sure);
+      if (margin >= 0.0) visit(point, sure, margin);
       s += sure;
     }
   }
@@ -135,24 +137,36 @@ struct InnerSphere {
   Vector3d outwards;       ///< to the nearest point of the surface, m
   double depth = 0.0;      ///< m
   int layer = 0;
+  bool settled = true;  ///< else the depth is at least this, and outwards is not known
 };
 
-InnerSphere inner_sphere(const Surface& surface, Eigen::Index point, const Vector3d& place) {
-  InnerSphere sphere{point, place, surface.nearest(place).position - place, 0.0, 0};
+/// @param part of the surface, near which the one before lay
+InnerSphere inner_sphere(const Surface& surface, Eigen::Index point, const Vector3d& place,
+                         int& part) {
+  constexpr double kAnywhere = std::numeric_limits<double>::infinity();
+  InnerSphere sphere{point, place, surface.nearest_of_moved(place, kAnywhere, part) - place,
+                     0.0,   0,     true};
   sphere.depth = sphere.outwards.norm();
   return sphere;
 }
 
-/// All points, the deepest first.
-std::vector<InnerSphere> by_depth(const Surface& surface, const Positions& points) {
+bool is_deeper(const InnerSphere& a, const InnerSphere& b) {
+  return std::tuple(-a.depth, a.point) < std::tuple(-b.depth, b.point);
+}
+
+/// All points, the deepest first; how deep those beyond `shallow` lie is not asked yet.
+/// @param least depth of each, m
+std::vector<InnerSphere> by_depth(const Surface& surface, const Positions& points,
+                                  const std::vector<double>& least, double shallow) {
   std::vector<InnerSphere> inner(static_cast<std::size_t>(points.cols()));
+  int part = -1;
   for (std::size_t i = 0; i < inner.size(); ++i) {
     const auto point = static_cast<Eigen::Index>(i);
-    inner[i] = inner_sphere(surface, point, points.col(point));
+    inner[i] = least[i] > shallow
+                   ? InnerSphere{point, points.col(point), Vector3d::Zero(), least[i], 0, false}
+                   : inner_sphere(surface, point, points.col(point), part);
   }
-  std::sort(inner.begin(), inner.end(), [](const InnerSphere& a, const InnerSphere& b) {
-    return std::tuple(-a.depth, a.point) < std::tuple(-b.depth, b.point);
-  });
+  std::sort(inner.begin(), inner.end(), is_deeper);
   return inner;
 }
 
@@ -169,12 +183,32 @@ struct SolidFilling {
   }
 };
 
+/// Asks how deep the deep spheres lie, which only what is kept of a filling needs.
+void settle(const Surface& surface, SolidFilling& filling) {
+  int part = -1;
+  // In the order of the lattice, in which each is near the one before.
+  std::vector<InnerSphere*> open;
+  for (InnerSphere& sphere : filling.inner) {
+    if (!sphere.settled) open.push_back(&sphere);
+  }
+  std::sort(open.begin(), open.end(),
+            [](const InnerSphere* a, const InnerSphere* b) { return a->point < b->point; });
+  for (InnerSphere* sphere : open) {
+    *sphere = inner_sphere(surface, sphere->point, sphere->place, part);
+  }
+  const auto end = std::find_if(
+      filling.inner.begin(), filling.inner.end(),
+      [&](const InnerSphere& sphere) { return sphere.point >= filling.lattice_points; });
+  std::sort(filling.inner.begin(), end, is_deeper);
+}
+
 /// @param most spheres; the lattice's shallowest are left out
 SolidFilling lattice_filling(const Surface& surface, const SolidRequest& request, double spacing,
                              std::size_t most) {
   SolidFilling filling;
   filling.spacing = spacing;
-  const Positions lattice = DeepPoints(surface, request.lattice, spacing).collect();
+  std::vector<double> least;
+  const Positions lattice = DeepPoints(surface, request.lattice, spacing).collect(least);
   const std::size_t all = even_count(surface, spacing) + static_cast<std::size_t>(lattice.cols());
   require_sphere_count(std::min(all, most));
   filling.outer =
@@ -183,10 +217,16 @@ SolidFilling lattice_filling(const Surface& surface, const SolidRequest& request
   for (Eigen::Index i = 0; i < filling.outer.cols(); ++i) {
     filling.normal.col(i) = surface.nearest(filling.outer.col(i)).normal;
   }
-  filling.inner = by_depth(surface, lattice);
+  filling.inner = by_depth(surface, lattice, least, (1.0 + 1e-9) * kShallow * spacing);
   filling.lattice_points = filling.next_point = lattice.cols();
   const auto outer = static_cast<std::size_t>(filling.outer.cols());
-  filling.inner.resize(std::min(filling.inner.size(), most - outer));
+  if (const std::size_t room = most - outer; room < filling.inner.size()) {
+    const auto cut = filling.inner.begin() + static_cast<std::ptrdiff_t>(room);
+    if (!std::all_of(cut, filling.inner.end(), [](const InnerSphere& s) { return s.settled; })) {
+      settle(surface, filling);
+    }
+    filling.inner.resize(room);
+  }
   return filling;
 }
 
@@ -204,8 +244,9 @@ Positions shallow(const SolidFilling& filling) {
 }
 
 void add_inner(const Surface& surface, SolidFilling& filling, const Positions& added) {
+  int part = -1;
   for (Eigen::Index i = 0; i < added.cols(); ++i) {
-    filling.inner.push_back(inner_sphere(surface, filling.next_point++, added.col(i)));
+    filling.inner.push_back(inner_sphere(surface, filling.next_point++, added.col(i), part));
   }
 }
 
@@ -387,6 +428,7 @@ SolidFilling counted_filling(const Surface& surface, const SolidRequest& request
     add_support(surface, filling, wanted, count - filling.count());
   }
   if (filling.count() < count) filling = std::move(first);
+  settle(surface, filling);
   leave_out(filling, filling.count() - count);
   return filling;
 }
@@ -415,6 +457,7 @@ Organ fill_solid(const Surface& surface, const SolidRequest& request) {
       added > 0 && request.count) {
     filling = counted_filling(surface, request, std::move(filling), added, known);
   }
+  settle(surface, filling);
   steady(surface, request, filling);
   require_sphere_count(filling.count());
   set_layers(filling.spacing, filling.inner);

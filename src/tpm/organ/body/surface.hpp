@@ -31,6 +31,15 @@ class Surface {
   /// knows.
   [[nodiscard]] virtual Eigen::Vector3d nearest_position(const Eigen::Vector3d& point,
                                                          double within) const = 0;
+  /// The same place of a point that moves a little between one question and the next, found faster
+  /// beside the answer before.
+  /// @param part of the surface, as the surface numbers them; any number at first, and the part of
+  ///   this answer afterwards
+  [[nodiscard]] virtual Eigen::Vector3d nearest_of_moved(const Eigen::Vector3d& point,
+                                                         double within, int& part) const {
+    (void)part;
+    return nearest_position(point, within);
+  }
   /// Distance to the surface, negative inside.
   [[nodiscard]] virtual double signed_distance(const Eigen::Vector3d& point) const = 0;
   /// `count` points spread over the surface in proportion to area, the same for the same seed.

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <array>
+#include <cmath>
 #include <limits>
 #include <numeric>
 #include <utility>
@@ -15,6 +16,8 @@ namespace {
 
 constexpr int kLeaf = 5;      // the quickest for a liver, building included
 constexpr int kAlone = 4096;  // triangles that one thread splits
+/// Of lengths that leave triangles out, so that rounding leaves none out that is nearest.
+constexpr double kRoundedUp = 1.0 + 1e-9;
 
 using Eigen::Vector3d;
 
@@ -127,8 +130,12 @@ TriangleTree::OfChildren TriangleTree::squared_distances(const Node& node, const
 void TriangleTree::pack(int first, int count) {
   for (int at = first; at < first + count; ++at) {
     const int t = order_[static_cast<std::size_t>(at)];
-    packed_[static_cast<std::size_t>(at)] = {mesh_.corner(t, 0), mesh_.corner(t, 1),
-                                             mesh_.corner(t, 2), mesh_.area_vector(t).normalized()};
+    const Vector3d a = mesh_.corner(t, 0), b = mesh_.corner(t, 1), c = mesh_.corner(t, 2);
+    const Vector3d centre = (a + b + c) / 3.0;
+    const double squared = std::max(
+        {(a - centre).squaredNorm(), (b - centre).squaredNorm(), (c - centre).squaredNorm()});
+    packed_[static_cast<std::size_t>(at)] = {
+        a, b, c, mesh_.area_vector(t).normalized(), centre, kRoundedUp * std::sqrt(squared)};
   }
 }
 
@@ -187,6 +194,7 @@ TrianglePoint TriangleTree::nearest(const Vector3d& point, double within) const 
   // all children but one set aside.
   std::array<Open, 96> open;
   std::size_t depth = 0;
+  double reach = kRoundedUp * within;
   open[depth++] = {0.0, 0, 0};
   while (depth > 0) {
     const auto [bound, first, count] = open[--depth];
@@ -207,7 +215,8 @@ TrianglePoint TriangleTree::nearest(const Vector3d& point, double within) const 
       continue;
     }
     for (int at = first; at < first + count; ++at) {
-      const auto& [a, b, c, normal] = packed_[static_cast<std::size_t>(at)];
+      const auto& [a, b, c, normal, centre, radius] = packed_[static_cast<std::size_t>(at)];
+      if ((centre - point).squaredNorm() > (radius + reach) * (radius + reach)) continue;
       const double height = normal.dot(point - a);
       if (height * height >= best.squared_distance) continue;  // its plane is too far already
       const Vector3d weights = nearest_weights(a, b, c, point);
@@ -215,10 +224,28 @@ TrianglePoint TriangleTree::nearest(const Vector3d& point, double within) const 
       const double squared = (position - point).squaredNorm();
       if (squared < best.squared_distance) {
         best = {order_[static_cast<std::size_t>(at)], weights, position, squared};
+        reach = kRoundedUp * std::sqrt(squared);
       }
     }
   }
   return best.triangle >= 0 ? best : nearest(point);
+}
+
+TrianglePoint TriangleTree::nearest_beside(const Vector3d& point, double within,
+                                           int triangle) const {
+  if (triangle < 0 || triangle >= mesh_.triangles.cols()) return nearest(point, within);
+  const Vector3d a = mesh_.corner(triangle, 0), b = mesh_.corner(triangle, 1),
+                 c = mesh_.corner(triangle, 2);
+  const Vector3d normal = (b - a).cross(c - a);
+  const Vector3d to_a = a - point, to_b = b - point, to_c = c - point;
+  const bool above_it = normal.dot(to_b.cross(to_c)) > 0.0 && normal.dot(to_c.cross(to_a)) > 0.0 &&
+                        normal.dot(to_a.cross(to_b)) > 0.0;
+  const double distance =
+      above_it ? std::abs(normal.dot(to_a)) / normal.norm()
+               : std::sqrt(std::min({to_a.squaredNorm(), to_b.squaredNorm(), to_c.squaredNorm()}));
+  // Rounding must not leave out that triangle itself, on which the point may lie.
+  const double rounding = 1e-12 * bounds_.diagonal().norm();
+  return nearest(point, std::min(within, distance + rounding));
 }
 
 std::vector<int> TriangleTree::meeting(const Eigen::AlignedBox3d& box) const {

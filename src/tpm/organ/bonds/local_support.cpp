@@ -136,14 +136,15 @@ void require_supported(const BondSystem& bonds, const Organ& organ, const Constr
   const std::vector<double> support = local_support(bonds, organ, constraints);
   const std::vector<std::size_t> loose = loose_spheres(support);
   if (loose.empty()) return;
-  throw bad_input(
-      where,
-      fmt::format("nearly a mechanism: {} loose: {}, held by their neighbours with "
-                  "less than {} of their bonds' stiffness (least {})",
-                  loose.size() == 1 ? "1 sphere is" : fmt::format("{} spheres are", loose.size()),
-                  sphere_list(loose, organ.position), shortest(kLooseSupport),
-                  significant(support[loose.front()], 2)),
-      "diagonal bonds between the layers, or a wider support");
+  const bool one = loose.size() == 1;
+  throw bad_input(where,
+                  fmt::format("nearly a mechanism: {} loose: {}, held by {} neighbours with "
+                              "less than {} of {} bonds' stiffness (least {})",
+                              one ? "1 sphere is" : fmt::format("{} spheres are", loose.size()),
+                              sphere_list(loose, organ.position), one ? "its" : "their",
+                              shortest(kLooseSupport), one ? "its" : "their",
+                              significant(support[loose.front()], 2)),
+                  "diagonal bonds between the layers, or a wider support");
 }
 
 }  // namespace tpm::organ

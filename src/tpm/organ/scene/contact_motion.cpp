@@ -73,7 +73,7 @@ Protocol motion_of_recording(const ContactMotionKeys& motion, const DocumentPlac
 const Kinds<ContactMotionKeys, MotionKind>& contact_motion_kinds() {
   using K = ContactMotionKeys;
   static const Kinds<K, MotionKind> kinds(
-      {.name = "contact_protocol", .sentence = "what is imposed on one contact, from rest on"},
+      {.name = "contact_protocol", .sentence = "what is imposed on a contact, from rest on"},
       &K::kind,
       {plain_motion(MotionKind::ramp_hold, "a ramp to a depth, which is then held"),
        plain_motion(MotionKind::step_hold, "a jump to a depth, which is then held"),

@@ -1,5 +1,5 @@
 #pragma once
-// Own motion of a contact of a scene: the declaration of its keys, and the protocol.
+// What is imposed on the contacts of a scene, on all or on one: the keys, and the protocol.
 #include <filesystem>
 
 #include "tpm/base/namespaces.hpp"
@@ -16,7 +16,7 @@ enum class MotionKind {
   recording,  ///< the depths of a recording
 };
 
-/// Block `protocol` of a contact as a file says it.
+/// Block `protocol` of a scene or of a contact as a file says it.
 struct ContactMotionKeys {
   MotionKind kind = MotionKind::ramp_hold;
   ProtocolBlock block;  ///< of the first four

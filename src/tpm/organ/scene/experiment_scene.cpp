@@ -61,7 +61,7 @@ ExperimentScene parse_checked_experiment(const Json& scene, std::string_view whe
       keys.contacts ? contacts_of(*keys.contacts, tissue, at_contacts, folder)
                     : std::vector<SceneContact>{usual_contact(tissue, at_contacts.key("0"))};
   std::optional<Protocol> common;
-  if (keys.protocol) common = keys.protocol->protocol(at_protocol);
+  if (keys.protocol) common = protocol_of(*keys.protocol, at_protocol, folder);
   Protocol protocol = protocol_of_scene(common, contacts, at_contacts);
   require_possible(protocol, contacts, tissue, at_protocol);
   FormulationChoice formulation =

@@ -1,23 +1,23 @@
 #include "tpm/organ/scene/protocol_file.hpp"
 
 #include <algorithm>
+#include <filesystem>
 #include <utility>
 
-#include "tpm/files/blocks/protocol_block.hpp"
 #include "tpm/organ/scene/experiment_blocks.hpp"
 
 namespace tpm::organ {
 namespace {
 
 struct ProtocolFileKeys {
-  ProtocolBlock protocol;
+  ContactMotionKeys protocol;
   OutputKeys outputs;
 };
 
 const Block<ProtocolFileKeys>& protocol_file_block() {
   static const Block<ProtocolFileKeys> block(
       "protocol_file", "what is done to a tissue, and when its response is asked for",
-      {required(key("protocol", &ProtocolFileKeys::protocol, protocol_kinds().type(),
+      {required(key("protocol", &ProtocolFileKeys::protocol, contact_motion_kinds().type(),
                     "what is imposed")),
        key("outputs", &ProtocolFileKeys::outputs, outputs_block().type(),
            "when the response is told; default 61 times, evenly; fields are of a scene and not "
@@ -49,7 +49,8 @@ ProtocolFile parse_protocol_file(const Json& document, std::string_view where) {
   const DocumentPlace place{std::string(where)};
   const ProtocolFileKeys keys =
       protocol_file_block().made(checked(std::move(blocks), protocol_kind(), where), place);
-  Protocol protocol = keys.protocol.protocol(place.key("protocol"));
+  Protocol protocol =
+      protocol_of(keys.protocol, place.key("protocol"), std::filesystem::path(where).parent_path());
   std::vector<double> times = outputs_of(keys.outputs, protocol, place.key("outputs")).times_s;
   return {std::move(protocol), std::move(times)};
 }

@@ -20,7 +20,7 @@ const Block<SceneKeys>& scene_block() {
        key("contacts", &K::contacts, list(contact_kinds().type(), {.fewest = 1, .most = 100}),
            "what meets the tissue; default: the organ's contact sphere is driven"),
        with_example(
-           key("protocol", &K::protocol, protocol_kinds().type(),
+           key("protocol", &K::protocol, contact_motion_kinds().type(),
                "what is done to the tissue; tpm simulate needs it, tpm network does not"),
            {{"kind", "ramp_hold"}, {"depth", "8 mm"}, {"rate", "4 mm/s"}, {"hold", "29 s"}}),
        key("formulation", &K::formulation, formulation_type(), "how the response is computed"),

@@ -5,7 +5,6 @@
 #include <vector>
 
 #include "tpm/base/namespaces.hpp"
-#include "tpm/files/blocks/protocol_block.hpp"
 #include "tpm/files/keys/file_kind.hpp"
 #include "tpm/organ/scene/blocks.hpp"
 #include "tpm/organ/scene/experiment_blocks.hpp"
@@ -22,7 +21,7 @@ struct SceneKeys {
   std::optional<std::vector<std::size_t>> sliders;
   std::optional<std::vector<LoadKeys>> loads;
   std::optional<std::vector<ContactKeys>> contacts;
-  std::optional<ProtocolBlock> protocol;
+  std::optional<ContactMotionKeys> protocol;
   std::optional<FormulationKeys> formulation;
   std::optional<OutputKeys> outputs;
   std::optional<double> tolerance;
