@@ -376,7 +376,8 @@ Selection select_law(std::span<const PreparedRecording> recordings,
   }
   if (closest == nullptr) {
     throw Error(ExitCode::numerical, "selection",
-                fmt::format("none of {} laws could be fitted", laws.size()));
+                fmt::format("none of {} laws could be fitted: {}", laws.size(),
+                            s.candidates.front().reason));
   }
   s.samples = closest->fit.value_count;
   s.correlation = correlation_of(closest->fit);
