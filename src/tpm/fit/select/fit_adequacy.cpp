@@ -13,6 +13,7 @@
 #include "tpm/fit/adequacy.hpp"
 #include "tpm/fit/likelihood/load_imposed.hpp"
 #include "tpm/fit/select/configuration_remarks.hpp"
+#include "tpm/fit/select/reading_scatter.hpp"
 #include "tpm/fit/verdict.hpp"
 
 namespace tpm::fit {
@@ -20,7 +21,7 @@ namespace {
 
 constexpr double kLevel = 0.01;
 
-/// What a verdict is about: one recording's readings at rest, or the noise that was stated.
+/// A verdict on one recording's readings at rest, or on the noise that was stated.
 struct Judged {
   Adequacy adequacy;
   std::optional<std::size_t> choice;  ///< the recording; none: all data together
@@ -103,9 +104,8 @@ Adequacy adequacy_of(const RecordingFit& fit, const RestedRecording& rested, int
 }
 
 /// The drift of a recording that the fit takes, where it is further from what the rests show than
-/// both uncertainties allow: what the law cannot follow then went into the drift. With the noise
-/// of the fit and of the rests independent, the difference of both has the sum of their variances;
-/// the weight of the rests in the fit only makes it smaller.
+/// both uncertainties allow: what the law cannot follow then went into the drift. The difference of
+/// independent noises has the sum of their variances; the weight of the rests makes it smaller.
 /// @return empty if they agree, or if there is no such drift
 std::string drift_off(const FitResult& fit, std::size_t choice, double level) {
   const double far = normal_quantile(1.0 - 0.5 * level);
@@ -124,8 +124,7 @@ std::string drift_off(const FitResult& fit, std::size_t choice, double level) {
   return {};
 }
 
-/// The zero of a force cell that still warms up: the rest before the load bends.
-/// @return empty if it does not, by more than chance and than the noise
+/// The zero of a force cell that still warms up: the rest bends by more than chance and noise.
 std::string bend_of_rest(const RestedRecording& rested, double level) {
   constexpr double kStill = 1e-3;  // of the drive's range
   constexpr double kShare = 0.1;   // of the level of the other tests, which come first
@@ -240,7 +239,9 @@ std::string times_the_noise(const Judged& judged) {
   if (!judged.drift_off.empty()) return judged.drift_off;
   return fmt::format("residual {} times the noise {}",
                      times_text(judged.adequacy.residual_over_noise),
-                     judged.noise_was_stated ? "that is stated" : "at rest");
+                     judged.noise_was_stated            ? "that is stated"
+                     : judged.adequacy.noise_under_load ? "under load"
+                                                        : "at rest");
 }
 
 /// "this recording", or which of several.
@@ -250,7 +251,6 @@ std::string subject(const FitResult& fit, const Judged& judged) {
   return fmt::format("'{}'", fit.config.data[*judged.choice].dataset);
 }
 
-/// What a fit says of its adequacy.
 /// @param tried how many laws were fitted
 /// @param other one of them that does describe the data
 LawAdequacy stated(const FitResult& fit, const Judged& judged, std::size_t tried,
@@ -325,7 +325,6 @@ void state_of_rests(Selection& s, std::span<const PreparedRecording> recordings)
   chosen.reason = "does not describe the data";
 }
 
-/// That another law does better decisively.
 void state_better(FitResult& fit, const std::string& law, const std::string& better, double by) {
   LawAdequacy adequacy = fit.adequacy.value_or(LawAdequacy{});
   adequacy.verdict = described_name(Described::not_described);
@@ -376,17 +375,17 @@ std::vector<double> unloading_of(const RecordingFit& r) {
   return sizes;
 }
 
-void state_hysteresis(Selection& s) {
+void state_hysteresis(Selection& s, bool held) {
   Candidate& chosen = s.candidates[s.recommended];
   if (chosen.fit.adequacy && chosen.fit.adequacy->is_rejected()) return;
-  const std::string seen = hysteresis_of(chosen.fit);
+  const std::string seen = hysteresis_of(chosen.fit, held);
   if (seen.empty()) return;
+  const bool memory = chosen.law.branches > 0 || chosen.law.fractional != Fractional::none;
   LawAdequacy adequacy = chosen.fit.adequacy.value_or(LawAdequacy{});
   adequacy.verdict = described_name(Described::not_described);
   adequacy.summary = fmt::format(
-      "{} does not describe this recording: {}, and a law without memory has no hysteresis; hold "
-      "the depth, to see what relaxes",
-      law_name(chosen.law), seen);
+      "{} does not describe this recording: {}{}; hold the depth, to see what relaxes",
+      law_name(chosen.law), seen, memory ? "" : ", and a law without memory has no hysteresis");
   state(chosen.fit, std::move(adequacy));
   chosen.identified = false;
   chosen.reason = "does not describe the unloading";
@@ -394,11 +393,11 @@ void state_hysteresis(Selection& s) {
 
 }  // namespace
 
-std::string hysteresis_of(const FitResult& fit) {
+std::string hysteresis_of(const FitResult& fit, bool held) {
   constexpr std::size_t kFewest = 8;
   constexpr double kOfMedian = 1.4826, kEfficiency = 0.37;  // of a normal distribution's median
   const auto& law = fit.config.law;
-  if (!law || law->branches > 0 || law->fractional != Fractional::none) return {};
+  if (!law || (held && (law->branches > 0 || law->fractional != Fractional::none))) return {};
   for (const RecordingFit& r : fit.recordings) {
     if (fit.config.data[r.choice].load_imposed) continue;
     const std::vector<double> unloading = unloading_of(r);
@@ -466,7 +465,7 @@ void keep_choice(Selection& s) {
 void state_adequacy(Selection& s, std::span<const PreparedRecording> recordings) {
   state_of_rests(s, recordings);
   state_preferred(s);
-  state_hysteresis(s);
+  state_hysteresis(s, protocol_spans(recordings).hold_s > 0.0);
 }
 
 void state_adequacy(FitResult& fit, const std::vector<DataSet>& data) {
@@ -490,6 +489,7 @@ FitResult fit_and_judge(const FitProblem& problem) {
   FitResult fit = run_fit(problem.config, data);
   give_both_drift_answers(fit, data);
   state_adequacy(fit, data);
+  state_scatter(fit);
   state_choice(fit);
   std::vector<Remark> remarks = configuration_remarks(fit, data, problem.data.empty());
   fit.remarks.insert(fit.remarks.begin(), std::make_move_iterator(remarks.begin()),

@@ -359,11 +359,13 @@ Selection select_law(const MaterialFunction& function, const SelectionOptions& o
   s.remarks = range_remarks(chosen.fit, sizes_of_function(function));
   if (floor) {
     const Unit unit = shown_unit(quantity_dimension(chosen.fit.data.front().datum.quantity));
+    const bool alike = *floor > sizes_of_function(function).largest;
     s.remarks.push_back(
         {"scatter_of_small_readings",
-         fmt::format("small readings scatter by more than their share: the noise is taken to be "
-                     "that of a reading and of {} together",
-                     with_unit(significant(*floor / unit.to_si, 2), unit))});
+         alike ? std::string("the readings scatter alike: the noise is taken to be equal for all")
+               : fmt::format("small readings scatter by more than their share: the noise is taken "
+                             "to be that share of a reading and of {} together",
+                             with_unit(significant(*floor / unit.to_si, 2), unit))});
   }
   if (chosen.fit.adequacy) s.summary.push_back(chosen.fit.adequacy->summary);
   s.summary.push_back(fmt::format(

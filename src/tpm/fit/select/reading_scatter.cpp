@@ -82,13 +82,15 @@ std::optional<ReadingScatter> reading_scatter(const FitResult& fit) {
   double pairs = 0.0, count = 0.0, squares = 0.0, products = 0.0, differences = 0.0;
   double share = 0.0;  // of its size, the largest residual
   for (const auto& curve : reading_curves(fit)) {
+    double largest = 0.0;
+    for (const ScatteredReading& r : curve) largest = std::max(largest, r.size);
     for (std::size_t i = 0; i < curve.size(); ++i) {
       const double z = curve[i].standardised;
       squares += z * z;
       count += 1.0;
-      if (curve[i].size > 0.0) {
-        share = std::max(share, std::abs(curve[i].residual) / curve[i].size);
-      }
+      // No instrument reads more decades at once.
+      const double size = std::max(curve[i].size, kRounding * largest);
+      if (size > 0.0) share = std::max(share, std::abs(curve[i].residual) / size);
       if (i == 0) continue;
       const double before = curve[i - 1].standardised;
       products += before * z;
