@@ -345,42 +345,6 @@ TEST_CASE("what is pooled over a recording that the law does not describe is not
   }
 }
 
-TEST_CASE("without a hold, an unloading that a law with memory misses contradicts it",
-          "[adequacy]") {
-  // Softening that remembers no time: the unloading is weaker at any speed.
-  const auto selected = [](double softening) {
-    test::PlacedTest placed;
-    placed.law = "linear-1";
-    placed.rest_s = 3.0;
-    placed.ramp_s = 1.5;
-    placed.hold_s = 0.0;
-    placed.after_s = 1.0;
-    placed.step_s = 0.02;
-    placed.noise_N = 4e-4;
-    Random random(5);
-    Recording r = test::measured(placed, test::placed(placed), random);
-    const auto peak = std::ranges::max_element(r.drive) - r.drive.begin();
-    for (auto i = static_cast<std::size_t>(peak); i < r.drive.size(); ++i) {
-      const double share = r.drive[i] / placed.depth_m;
-      r.response[i] *= 1.0 - softening * (1.0 - share);
-    }
-    const PreparedRecording recording = prepare_recording("made.csv", std::move(r));
-    SelectionOptions options;
-    options.laws = {parse_law_name("linear-1", "test")};
-    options.only_listed = true;
-    options.held_out = false;
-    options.setup.starts = 4;
-    options.setup.profiles = false;
-    return select_law(std::span(&recording, 1), options);
-  };
-  const Selection soft = selected(0.6);
-  REQUIRE(best_of(soft).adequacy);
-  CHECK_THAT(best_of(soft).adequacy->summary, Contains("does not describe this recording"));
-  CHECK(best_of(soft).adequacy->is_rejected());
-  for (const ParameterResult& p : best_of(soft).parameters) CHECK(p.only_if_described);
-  CHECK_FALSE(best_of(selected(0.0)).adequacy.value().is_rejected());
-}
-
 TEST_CASE("a plateau that the hold does not reach is not identified", "[adequacy]") {
   const auto verdict = [](double tau_s) {
     test::PlacedTest placed;

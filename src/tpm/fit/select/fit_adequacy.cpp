@@ -375,17 +375,17 @@ std::vector<double> unloading_of(const RecordingFit& r) {
   return sizes;
 }
 
-void state_hysteresis(Selection& s, bool held) {
+void state_hysteresis(Selection& s) {
   Candidate& chosen = s.candidates[s.recommended];
   if (chosen.fit.adequacy && chosen.fit.adequacy->is_rejected()) return;
-  const std::string seen = hysteresis_of(chosen.fit, held);
+  const std::string seen = hysteresis_of(chosen.fit);
   if (seen.empty()) return;
-  const bool memory = chosen.law.branches > 0 || chosen.law.fractional != Fractional::none;
   LawAdequacy adequacy = chosen.fit.adequacy.value_or(LawAdequacy{});
   adequacy.verdict = described_name(Described::not_described);
   adequacy.summary = fmt::format(
-      "{} does not describe this recording: {}{}; hold the depth, to see what relaxes",
-      law_name(chosen.law), seen, memory ? "" : ", and a law without memory has no hysteresis");
+      "{} does not describe this recording: {}, and a law without memory has no hysteresis; hold "
+      "the depth, to see what relaxes",
+      law_name(chosen.law), seen);
   state(chosen.fit, std::move(adequacy));
   chosen.identified = false;
   chosen.reason = "does not describe the unloading";
@@ -393,11 +393,11 @@ void state_hysteresis(Selection& s, bool held) {
 
 }  // namespace
 
-std::string hysteresis_of(const FitResult& fit, bool held) {
+std::string hysteresis_of(const FitResult& fit) {
   constexpr std::size_t kFewest = 8;
   constexpr double kOfMedian = 1.4826, kEfficiency = 0.37;  // of a normal distribution's median
   const auto& law = fit.config.law;
-  if (!law || (held && (law->branches > 0 || law->fractional != Fractional::none))) return {};
+  if (!law || law->branches > 0 || law->fractional != Fractional::none) return {};
   for (const RecordingFit& r : fit.recordings) {
     if (fit.config.data[r.choice].load_imposed) continue;
     const std::vector<double> unloading = unloading_of(r);
@@ -465,7 +465,7 @@ void keep_choice(Selection& s) {
 void state_adequacy(Selection& s, std::span<const PreparedRecording> recordings) {
   state_of_rests(s, recordings);
   state_preferred(s);
-  state_hysteresis(s, protocol_spans(recordings).hold_s > 0.0);
+  state_hysteresis(s);
 }
 
 void state_adequacy(FitResult& fit, const std::vector<DataSet>& data) {

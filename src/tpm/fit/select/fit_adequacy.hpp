@@ -46,11 +46,9 @@ void state_adequacy(FitResult& fit, const std::vector<DataSet>& data);
 
 /// A law without memory answers each depth with one force, in unloading as in loading: a hysteresis
 /// behind the fitted part contradicts it, whatever makes it (relaxation, adhesion), and what it
-/// calls the equilibrium. So does an unloading that a law with memory misses where nothing was
-/// held: only the unloading tells a relaxation from a curved kernel there.
-/// @param held a hold is among the fitted samples: laws with memory are then not judged
+/// calls the equilibrium.
 /// @return what is seen (F test at 1 %); empty if nothing speaks against the law, or it has a
 /// memory
-[[nodiscard]] std::string hysteresis_of(const FitResult& fit, bool held = true);
+[[nodiscard]] std::string hysteresis_of(const FitResult& fit);
 
 }  // namespace tpm::fit

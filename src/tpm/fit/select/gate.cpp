@@ -35,7 +35,7 @@ bool may_vanish(const LawSpec& law, const std::string& parameter) {
 
 /// See Candidate::contradicted.
 bool contradicts(const Candidate& candidate, const ProtocolSpans& spans) {
-  if (!hysteresis_of(candidate.fit, spans.hold_s > 0.0).empty()) return true;
+  if (!hysteresis_of(candidate.fit).empty()) return true;
   double longest_s = 0.0;
   const auto table = law_parameters(candidate.fit.config.law.value());
   for (const ParameterResult& p : candidate.fit.parameters) {
@@ -65,8 +65,7 @@ std::string dashpot_words(const FitResult& fit, const std::string& time_name) {
 
 Refusal refusal_of(const Candidate& candidate, const ProtocolSpans& spans) {
   constexpr int kLeastStandardErrors = 2;
-  if (const std::string seen = hysteresis_of(candidate.fit, spans.hold_s > 0.0); !seen.empty())
-    return {seen};
+  if (const std::string seen = hysteresis_of(candidate.fit); !seen.empty()) return {seen};
   double longest_s = 0.0;
   Refusal first;  // of a standard error: other reasons go before it
   const auto keep = [&](Refusal refusal) {
