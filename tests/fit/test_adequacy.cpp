@@ -161,6 +161,37 @@ TEST_CASE("a law that leaves three times the noise is found", "[adequacy]") {
   CHECK(found >= 927);
 }
 
+TEST_CASE("noise that grows under load is no lack of fit, and a smooth misfit beside it is",
+          "[adequacy]") {
+  int wrong = 0, found = 0;
+  for (int i = 0; i < 300; ++i) {
+    Simulated s = simulated_adequacy(40, 0.0, ResidualDefect::none, 0.0, 0.0, 700 + i);
+    for (double& off : s.residual) off *= 12.0;  // a probe that shakes in contact
+    const Adequacy a = judge_adequacy(s.data());
+    CHECK(a.noise_under_load);
+    wrong += a.described == Described::not_described;
+    for (std::size_t k = 0; k < s.residual.size(); ++k) {
+      s.residual[k] += 36.0 * std::sin(6.0 * static_cast<double>(k) / kLoaded);
+    }
+    found += judge_adequacy(s.data()).described == Described::not_described;
+  }
+  CHECK(wrong <= 10);
+  CHECK(found >= 297);
+  const Simulated even = simulated_adequacy(40, 0.0, ResidualDefect::none, 0.0, 0.0, 3);
+  CHECK_FALSE(judge_adequacy(even.data()).noise_under_load);
+}
+
+TEST_CASE("readings before the load are no lost signal", "[adequacy]") {
+  Simulated s = simulated_adequacy(60, 0.0, ResidualDefect::slow_branch, 30.0, 0.0, 8);
+  for (int i = 0; i < 6; ++i) {
+    s.reading[i] = 0.2 * (i % 3 - 1);
+    s.residual[i] = -40.0;  // an offset that the fit takes in vain
+  }
+  for (const std::string& cause : judge_adequacy(s.data()).causes) {
+    CHECK_THAT(cause, !Catch::StartsWith("lost signal"));
+  }
+}
+
 TEST_CASE("a clipped force cell is named", "[adequacy]") {
   int named = 0;
   Random pick(7);

@@ -16,6 +16,7 @@
 #include "tpm/fit/select/fit_adequacy.hpp"
 #include "tpm/fit/select/specimens.hpp"
 #include "tpm/fit/select/young_moduli.hpp"
+#include "tpm/fit/verdict.hpp"
 #include "tpmkit/law_file.hpp"
 #include "tpmkit/law_model.hpp"
 
@@ -358,6 +359,29 @@ TEST_CASE("what is pooled over a recording that the law does not describe is not
   for (const YoungModulus& m : pooled_moduli(healthy, punch, false).moduli) {
     CHECK_THAT(m.verdict, !Contains(kCondition));
   }
+}
+
+TEST_CASE("a plateau that the hold does not reach is not identified", "[adequacy]") {
+  const auto verdict = [](double tau_s) {
+    test::PlacedTest placed;
+    placed.material = {50.0, 30.0, tau_s};
+    placed.rest_s = 20.0;
+    placed.hold_s = 20.0;
+    placed.noise_N = 1e-4;
+    const PreparedRecording recording = test::prepared(placed, 3);
+    SelectionOptions options;
+    options.laws = {parse_law_name("linear-1", "test")};
+    options.only_listed = true;
+    options.held_out = false;
+    options.setup.starts = 4;
+    const Selection s = select_law(std::span(&recording, 1), options);
+    for (const ParameterResult& p : best_of(s).parameters) {
+      if (p.parameter.name == "k_inf") return verdict_text(p);
+    }
+    return std::string();
+  };
+  CHECK(verdict(9.0) == "not identified: the plateau or a slower branch: not separable");
+  CHECK(verdict(2.0) == "identified");
 }
 
 TEST_CASE("an unloading with hysteresis contradicts a law without memory", "[adequacy]") {

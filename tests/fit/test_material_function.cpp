@@ -8,6 +8,7 @@
 #include "fitted_parameter.hpp"
 #include "refusal.hpp"
 #include "temp_folder.hpp"
+#include "tpm/base/random.hpp"
 #include "tpm/files/file.hpp"
 #include "tpm/fit/likelihood/config.hpp"
 #include "tpm/fit/select/fit_adequacy.hpp"
@@ -206,6 +207,53 @@ TEST_CASE("A spectrum is fitted from magnitude and phase over an angular frequen
   check_two_branches(chosen(s));
   const FitResult rerun = run_fit(parse_fit_config(config_json(chosen(s).config), "config.json"));
   check_two_branches(rerun);
+}
+
+TEST_CASE("Small readings that scatter by more than their share do not rule a fit") {
+  const test::TempFolder folder;
+  std::string text = "time [s],G(t) [Pa]\n";
+  base::Random random(7);
+  for (const double t : decades_of(0.01, 25.0, 90)) {
+    const double g = 3200.0 * std::exp(-t / 1.5) + 700.0 * std::exp(-t / 9.0);
+    const double read = g * (1.0 + 0.01 * random.normal()) + 4.0 * random.normal();
+    text += fmt::format("{:.6g},{:.6g}\n", t, read);
+  }
+  write_file(folder / "g.csv", text);
+  const Selection s = select_law(read_function(folder / "g.csv"), quick());
+  CHECK(chosen(s).config.data.front().noise.kind == NoiseKind::combined);
+  CHECK(law_name(chosen(s).config.law.value()) == "linear-2-fluid");
+  CHECK_FALSE((chosen(s).adequacy && chosen(s).adequacy->is_rejected()));
+  const bool in_order = estimate_of(chosen(s), "tau1") < estimate_of(chosen(s), "tau2");
+  CHECK_THAT(estimate_of(chosen(s), in_order ? "tau2" : "tau1"), WithinRel(9.0, 0.06));
+}
+
+TEST_CASE("A sweep with the inertia of the instrument is not described by a law of tissue") {
+  const test::TempFolder folder;
+  const auto sweep = [&](double inertia) {
+    std::string text = "Frequency [Hz],G' [Pa],G\" [Pa]\n";
+    base::Random random(3);
+    for (const double f : decades_of(0.01, 60.0, 39)) {
+      const double w = 2.0 * std::numbers::pi * f;
+      double storage = 500.0 - inertia * w * w, loss = 0.0;
+      for (const auto& [stiffness, tau] : {std::pair{300.0, 1.0}, {200.0, 0.05}}) {
+        const double x = w * tau;
+        storage += stiffness * x * x / (1.0 + x * x);
+        loss += stiffness * x / (1.0 + x * x);
+      }
+      text += fmt::format("{:.6g},{:.6g},{:.6g}\n", f, storage * (1.0 + 0.005 * random.normal()),
+                          loss * (1.0 + 0.005 * random.normal()));
+    }
+    const std::string name = inertia > 0.0 ? "inert.csv" : "healthy.csv";
+    write_file(folder / name, text);
+    return select_law(read_function(folder / name), quick());
+  };
+  const Selection healthy = sweep(0.0);
+  CHECK_FALSE((chosen(healthy).adequacy && chosen(healthy).adequacy->is_rejected()));
+  const Selection inert = sweep(2e-3);
+  REQUIRE(chosen(inert).adequacy);
+  CHECK(chosen(inert).adequacy->is_rejected());
+  CHECK_THAT(chosen(inert).adequacy->summary, Contains("the residuals follow each other"));
+  for (const ParameterResult& p : chosen(inert).parameters) CHECK(p.only_if_described);
 }
 
 TEST_CASE(

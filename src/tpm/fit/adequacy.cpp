@@ -10,6 +10,7 @@
 
 #include "tpm/base/distributions.hpp"
 #include "tpm/base/enum_names.hpp"
+#include "tpm/base/median.hpp"
 #include "tpm/base/namespaces.hpp"
 #include "tpm/base/text.hpp"
 #include "tpmkit/error.hpp"
@@ -21,6 +22,7 @@ constexpr std::size_t kFewestAtRest = 8;
 constexpr double kFewestDegrees = 4.0;  // of the noise at rest
 constexpr double kConfidence = 2.0;     // standard errors of a correlation
 constexpr double kMostCorrelation = 0.98;
+constexpr double kSure = 1e-3;  // level at which noise under load is more than that at rest
 
 void require_alike(const AdequacyData& data) {
   const auto finite = [](std::span<const double> values) {
@@ -119,7 +121,27 @@ SquaresAboutLine squares_about_line(std::size_t n, double rho) {
 /// The noise as the rest and, if the law is right, the residuals tell it.
 struct RestNoise {
   double variance = 0.0, degrees = 0.0, correlation = 0.0;
+  bool under_load = false;
 };
+
+/// Variance of the residuals about the line between their neighbours, as the mean over blocks: a
+/// noise may grow with the load. The median in each block leaves out jumps.
+/// @return 0 below two blocks
+double scatter_under_load(std::span<const double> residual) {
+  constexpr std::size_t kBlock = 32;
+  constexpr double kOfMedian = 1.4826, kOfLine = 1.5;
+  double sum = 0.0, blocks = 0.0;
+  for (std::size_t begin = 1; begin + kBlock < residual.size(); begin += kBlock) {
+    std::vector<double> off;
+    for (std::size_t i = begin; i < begin + kBlock; ++i) {
+      off.push_back(std::abs(residual[i] - 0.5 * (residual[i - 1] + residual[i + 1])));
+    }
+    const double sd = kOfMedian * median(std::move(off));
+    sum += sd * sd / kOfLine;
+    blocks += 1.0;
+  }
+  return blocks >= 2.0 ? sum / blocks : 0.0;
+}
 
 RestNoise noise_of(const AdequacyData& data) {
   RestNoise noise;
@@ -140,6 +162,15 @@ RestNoise noise_of(const AdequacyData& data) {
   all.insert(all.end(), data.reading.begin(), data.reading.end());
   const double quantum = quantum_of(all);
   noise.variance += quantum * quantum / 12.0 + data.carried_variance;
+  constexpr double kEfficiency = 0.25;  // of a median of second differences, in readings
+  const double scatter = scatter_under_load(data.residual);
+  const double degrees = kEfficiency * static_cast<double>(data.residual.size());
+  noise.under_load = noise.variance > 0.0 && scatter > noise.variance &&
+                     fisher_tail(scatter / noise.variance, degrees, noise.degrees) < kSure;
+  if (noise.under_load) {
+    noise.variance = scatter;
+    noise.degrees = degrees;
+  }
   return noise;
 }
 
@@ -188,8 +219,11 @@ std::optional<LostSignal> signal_lost(const AdequacyData& data, const RestNoise&
   const double sd = std::sqrt(noise.variance);
   const auto at_rest = [&](double reading) { return std::abs(reading - level) <= kAtRest * sd; };
   int count = 0;
+  bool loaded = false;  // readings before the load are at rest, too
   for (std::size_t i = 0; i < data.reading.size(); ++i) {
-    const bool lost = at_rest(data.reading[i]) && std::abs(data.residual[i]) > kFarOff * sd;
+    loaded = loaded || std::abs(data.reading[i] - level) > kFarOff * sd;
+    const bool lost =
+        loaded && at_rest(data.reading[i]) && std::abs(data.residual[i]) > kFarOff * sd;
     count = lost ? count + 1 : 0;
     if (count < kInARow) continue;
     const auto later = data.reading.subspan(i);
@@ -352,6 +386,7 @@ Adequacy judge_adequacy(const AdequacyData& data, double level) {
   if (data.rest.size() < kFewestAtRest || !(n > data.parameters)) return result;
   const RestNoise noise = noise_of(data);
   result.noise_sd = std::sqrt(noise.variance);
+  result.noise_under_load = noise.under_load;
   result.rest_degrees = noise.degrees;
   if (noise.degrees < kFewestDegrees || !(noise.variance > 0.0)) return result;
   const double square = squares_about(data.residual, 0.0) / (n - data.parameters);

@@ -53,10 +53,11 @@ struct EqualRun {
 struct Adequacy {
   Described described = Described::not_judged;
   double residual_over_noise = 0.0;  ///< ratio of standard deviations; 0 if not judged
-  double noise_sd = 0.0;             ///< at rest, with the rounding of the readings
-  double rest_degrees = 0.0;         ///< degrees of freedom of its square
-  double p_value = 1.0;              ///< of a ratio at least this large if the law is right
-  std::vector<Remark> causes;        ///< likely ones, if not described
+  double noise_sd = 0.0;             ///< at rest, with the rounding of the readings, or under load
+  bool noise_under_load = false;  ///< neighbouring readings under load scatter by more than at rest
+  double rest_degrees = 0.0;      ///< degrees of freedom of its square
+  double p_value = 1.0;           ///< of a ratio at least this large if the law is right
+  std::vector<Remark> causes;     ///< likely ones, if not described
 };
 
 /// The longest run of equal readings at the largest or smallest value that is longer than rounding
@@ -92,6 +93,11 @@ struct RestBend {
 /// to steps q. The degrees of freedom of both are those of the chi-square with the same first two
 /// moments (Satterthwaite), 2 E^2 / Var, at the upper confidence bound of rho: the smaller one of
 /// what the rest and the residuals tell, since under the hypothesis both are the same noise.
+///
+/// Noise may grow under load (a probe that shakes, noise in parts of a reading). Where the
+/// residuals scatter about their neighbours by more than the rest, s^2 is that scatter instead: of
+/// blocks of 32 samples the median of second differences, which a course that is smooth or jumps
+/// now and then leaves out.
 ///
 /// @param level probability of calling a law that is right not described, in (0, 1)
 /// Throws Error(bad_input) for readings that are not finite or spans of unequal lengths.

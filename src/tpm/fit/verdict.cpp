@@ -135,8 +135,9 @@ std::string range_words(const ParameterResult& p, double level) {
           fmt::format("{} to {}", in_sized_unit(p, *p.lower), in_sized_unit(p, *p.upper));
       if (!p.not_separable.empty()) {
         return fmt::format(
-            "{} = {} is not identified: {}: not separable; {} interval without drift {}", f.name,
-            in_sized_unit(p, p.estimate), p.not_separable, percent(level), interval);
+            "{} = {} is not identified: {}: not separable; {} interval without {} {}", f.name,
+            in_sized_unit(p, p.estimate), p.not_separable, percent(level),
+            p.not_separable.starts_with("drift") ? "drift" : "such a branch", interval);
       }
       if (p.unconfirmed) {
         return fmt::format("{} = {} is not identified: {}; {} interval of this minimum {}", f.name,

@@ -15,6 +15,7 @@
 #include "tpm/fit/likelihood/load_imposed.hpp"
 #include "tpm/fit/select/configuration_remarks.hpp"
 #include "tpm/fit/select/law_choice.hpp"
+#include "tpm/fit/select/reading_scatter.hpp"
 #include "tpm/fit/verdict.hpp"
 
 namespace tpm::fit {
@@ -22,7 +23,7 @@ namespace {
 
 constexpr double kLevel = 0.01;
 
-/// What a verdict is about: one recording's readings at rest, or the noise that was stated.
+/// A verdict on one recording's readings at rest, or on the noise that was stated.
 struct Judged {
   Adequacy adequacy;
   std::optional<std::size_t> choice;  ///< the recording; none: all data together
@@ -105,9 +106,8 @@ Adequacy adequacy_of(const RecordingFit& fit, const RestedRecording& rested, int
 }
 
 /// The drift of a recording that the fit takes, where it is further from what the rests show than
-/// both uncertainties allow: what the law cannot follow then went into the drift. With the noise
-/// of the fit and of the rests independent, the difference of both has the sum of their variances;
-/// the weight of the rests in the fit only makes it smaller.
+/// both uncertainties allow: what the law cannot follow then went into the drift. The difference of
+/// independent noises has the sum of their variances; the weight of the rests makes it smaller.
 /// @return empty if they agree, or if there is no such drift
 std::string drift_off(const FitResult& fit, std::size_t choice, double level) {
   const double far = normal_quantile(1.0 - 0.5 * level);
@@ -126,8 +126,7 @@ std::string drift_off(const FitResult& fit, std::size_t choice, double level) {
   return {};
 }
 
-/// The zero of a force cell that still warms up: the rest before the load bends.
-/// @return empty if it does not, by more than chance and than the noise
+/// The zero of a force cell that still warms up: the rest bends by more than chance and noise.
 std::string bend_of_rest(const RestedRecording& rested, double level) {
   constexpr double kStill = 1e-3;  // of the drive's range
   constexpr double kShare = 0.1;   // of the level of the other tests, which come first
@@ -244,7 +243,9 @@ std::string times_the_noise(const Judged& judged) {
   if (!judged.drift_off.empty()) return judged.drift_off;
   return fmt::format("residual {} times the noise {}",
                      times_text(judged.adequacy.residual_over_noise),
-                     judged.noise_was_stated ? "that is stated" : "at rest");
+                     judged.noise_was_stated            ? "that is stated"
+                     : judged.adequacy.noise_under_load ? "under load"
+                                                        : "at rest");
 }
 
 /// "this recording", or which of several.
@@ -254,7 +255,6 @@ std::string subject(const FitResult& fit, const Judged& judged) {
   return fmt::format("'{}'", fit.config.data[*judged.choice].dataset);
 }
 
-/// What a fit says of its adequacy.
 /// @param tried how many laws were fitted
 /// @param other one of them that does describe the data
 LawAdequacy stated(const FitResult& fit, const Judged& judged, std::size_t tried,
@@ -452,6 +452,7 @@ FitResult fit_and_judge(const FitProblem& problem) {
   FitResult fit = run_fit(problem.config, data);
   give_both_drift_answers(fit, data);
   state_adequacy(fit, data);
+  state_scatter(fit);
   repeat_choice(fit);
   std::vector<Remark> remarks = configuration_remarks(fit, data, problem.data.empty());
   fit.remarks.insert(fit.remarks.begin(), std::make_move_iterator(remarks.begin()),

@@ -222,8 +222,8 @@ std::string least_law_words(const Selection& s, const std::string& data) {
   }
   if (s.candidates.size() == 1) return "the law that was asked for is";
   if (chosen.fit.adequacy && chosen.fit.adequacy->is_rejected()) {
-    return fmt::format("no law that is identified describes {}; the least of {} is", data,
-                       s.candidates.size());
+    return fmt::format("no law that is identified describes {}; the least of {} is",
+                       data == "they" ? "them" : data, s.candidates.size());
   }
   if (chosen.identified) return fmt::format("the simplest law that {} support is", data);
   return fmt::format("{} identify none of the {} laws; near the best BIC the least{} is", data,

@@ -51,7 +51,9 @@ std::size_t end_of_load(std::span<const double> stress) {
   const auto peak = std::ranges::max_element(stress);
   const auto fallen =
       std::find_if(peak, stress.end(), [&](double s) { return *peak - s > kFallen * range; });
-  return static_cast<std::size_t>(fallen - stress.begin());
+  auto end = static_cast<std::size_t>(fallen - stress.begin());
+  while (fallen != stress.end() && end > 1 && stress[end - 1] < stress[end - 2]) --end;
+  return end;
 }
 
 /// True if a channel stays where it is over the last half of the load, while another goes on.

@@ -7,6 +7,7 @@
 #include <limits>
 #include <numbers>
 
+#include "tpm/base/quantity_text.hpp"
 #include "tpm/base/text.hpp"
 #include "tpm/files/import/recording_file.hpp"
 #include "tpm/fit/select/fit_adequacy.hpp"
@@ -14,6 +15,7 @@
 #include "tpm/fit/select/function_starts.hpp"
 #include "tpm/fit/select/gate.hpp"
 #include "tpm/fit/select/law_choice.hpp"
+#include "tpm/fit/select/reading_scatter.hpp"
 #include "tpm/fit/verdict.hpp"
 #include "tpm/work/progress.hpp"
 #include "tpmkit/error.hpp"
@@ -151,13 +153,26 @@ std::vector<DataSet> data_set_of(const MaterialFunction& function) {
   return {std::visit([](const auto& d) { return DataSet(d); }, function.data)};
 }
 
-Candidate fit_function(const LawSpec& law, const MaterialFunction& function, SetupOptions setup) {
+/// Noise of an instrument whose small readings scatter by more than a share of their size.
+/// @param floor see scatter_floor(); none: as function_config() assumes
+void add_floor(FitConfig& config, std::optional<double> floor) {
+  constexpr double kShare = 0.01;  // its size is estimated
+  if (!floor) return;
+  Noise& noise = config.data.front().noise;
+  noise.kind = NoiseKind::combined;
+  noise.relative = kShare;
+  noise.absolute = kShare * *floor;
+}
+
+Candidate fit_function(const LawSpec& law, const MaterialFunction& function, SetupOptions setup,
+                       std::optional<double> floor) {
   setup.profiles = false;
   // The stiffness of a spring-pot has no value at the step itself: a reading there is a reason
   // against the law, not an error of the file.
   const bool refusal_counts = law.fractional != Fractional::none;
-  Candidate candidate =
-      fit_candidate(function_config(law, function, setup), data_set_of(function), refusal_counts);
+  FitConfig config = function_config(law, function, setup);
+  add_floor(config, floor);
+  Candidate candidate = fit_candidate(config, data_set_of(function), refusal_counts);
   if (candidate.failed) return candidate;
   candidate.rms_over_peak = largest_residual_share(candidate.fit);
   judge_identified(candidate, kEndlessHold);
@@ -295,20 +310,24 @@ FitConfig function_config(LawSpec law, const MaterialFunction& function,
   return config;
 }
 
-Selection select_law(const MaterialFunction& function, const SelectionOptions& options) {
+namespace {
+
+/// Fits every law under one noise and ranks them.
+Selection ranked_laws(const MaterialFunction& function, const SelectionOptions& options,
+                      std::optional<double> floor) {
   const std::vector<LawSpec> laws = options.laws.empty() ? linear_family() : options.laws;
   Selection s;
   s.margin = options.margin;
   Progress progress("fitting laws", laws.size());
   for (const LawSpec& law : laws) {
-    s.candidates.push_back(fit_function(law, function, options.setup));
+    s.candidates.push_back(fit_function(law, function, options.setup, floor));
     progress.advance();
     const Candidate& made = s.candidates.back();
     const bool branched = law.branches > 0 && law.solid && law.form == BranchForm::parallel;
     if (options.only_listed || made.failed || !branched || !plateau_is_not_told(made.fit)) continue;
     LawSpec fluid = law;
     fluid.solid = false;
-    s.candidates.push_back(fit_function(fluid, function, options.setup));
+    s.candidates.push_back(fit_function(fluid, function, options.setup, floor));
   }
   const auto fitted = std::find_if(s.candidates.begin(), s.candidates.end(),
                                    [](const Candidate& c) { return !c.failed; });
@@ -320,13 +339,35 @@ Selection select_law(const MaterialFunction& function, const SelectionOptions& o
   s.samples = fitted->fit.value_count;
   s.effective_count = s.samples;
   rank_candidates(s, true);
+  return s;
+}
+
+}  // namespace
+
+Selection select_law(const MaterialFunction& function, const SelectionOptions& options) {
+  Selection s = ranked_laws(function, options, std::nullopt);
+  const auto floor = scatter_floor(s.candidates[s.best_bic].fit);
+  if (floor) s = ranked_laws(function, options, floor);
   const auto with_profiles = [&](const LawSpec& law) {
-    return run_fit(function_config(law, function, options.setup), data_set_of(function));
+    FitConfig config = function_config(law, function, options.setup);
+    add_floor(config, floor);
+    return run_fit(config, data_set_of(function));
   };
   settle_choice(s, kEndlessHold, options.setup.profiles ? ProfiledFit(with_profiles) : nullptr);
   state_preferred(s);
+  state_scatter(s);
   const Candidate& chosen = s.candidates[s.recommended];
   s.remarks = range_remarks(chosen.fit, sizes_of_function(function));
+  if (floor) {
+    const Unit unit = shown_unit(quantity_dimension(chosen.fit.data.front().datum.quantity));
+    const bool alike = *floor > sizes_of_function(function).largest;
+    s.remarks.push_back(
+        {"scatter_of_small_readings",
+         alike ? std::string("the readings scatter alike: the noise is taken to be equal for all")
+               : fmt::format("small readings scatter by more than their share: the noise is taken "
+                             "to be that share of a reading and of {} together",
+                             with_unit(significant(*floor / unit.to_si, 2), unit))});
+  }
   if (chosen.fit.adequacy) s.summary.push_back(chosen.fit.adequacy->summary);
   s.summary.push_back(fmt::format(
       "{} of {} readings; {} {} ({}): {} parameters, rms residual {} % of the largest "

@@ -25,6 +25,12 @@
 namespace tpm::fit {
 namespace {
 
+/// True for creep and recovery of a specimen whose stress is imposed: it has no contact that could
+/// shrink when the stress falls, and what it recovers tells flow from a slow branch.
+bool recovers(const PreparedRecording& r) {
+  return r.load_imposed && r.recording.response_quantity == Quantity::strain;
+}
+
 bool is_after_the_test(PhaseKind kind) {
   return kind == PhaseKind::unloading || kind == PhaseKind::detached || kind == PhaseKind::recovery;
 }
@@ -261,6 +267,7 @@ PreparedRecording prepare_recording(std::string name, Recording recording,
   for (const Phase& phase : r.phases.phases) {
     pressed = pressed || phase.kind == PhaseKind::loading || phase.kind == PhaseKind::hold;
     if (!pressed || !is_after_the_test(phase.kind) || swings_back(r, phase)) continue;
+    if (recovers(r)) break;
     r.to_s = time[phase.first];
     break;
   }

@@ -377,7 +377,8 @@ Selection select_law(std::span<const PreparedRecording> recordings,
   }
   if (closest == nullptr) {
     throw Error(ExitCode::numerical, "selection",
-                fmt::format("none of {} laws could be fitted", laws.size()));
+                fmt::format("none of {} laws could be fitted: {}", laws.size(),
+                            s.candidates.front().reason));
   }
   s.samples = closest->fit.value_count;
   s.correlation = correlation_of(closest->fit);
@@ -410,6 +411,9 @@ Selection select_law(std::span<const PreparedRecording> recordings,
     FitResult& preferred = s.candidates[*s.preferred].fit;
     const auto both = give_both_drift_answers(preferred, recordings);
     if (both) preferred.remarks.push_back({"drift_not_separable", drift_words(*both, preferred)});
+  }
+  for (const auto i : {std::optional(s.recommended), s.preferred}) {
+    if (i) doubt_plateau(s.candidates[*i].fit, protocol_spans(recordings));
   }
   const auto warn = [&s](std::vector<Remark> more) {
     std::ranges::move(more, std::back_inserter(s.remarks));

@@ -176,6 +176,11 @@ void reassess(Candidate& chosen, const ProtocolSpans& spans);
 /// unit that is not the file's.
 [[nodiscard]] std::vector<Remark> recording_remarks(std::span<const PreparedRecording> recordings);
 
+/// k_inf is an extrapolation by the law's last branch where the hold ends before that has relaxed
+/// (its time is over a third of the hold): any slower branch would change it. It is then not
+/// identified, whatever its interval (ParameterResult::not_separable).
+void doubt_plateau(FitResult& fit, const ProtocolSpans& spans);
+
 /// Properties of a fitted law that the protocol of a recording cannot resolve: relaxation times
 /// shorter than the ramp or the sampling, or longer than the hold.
 [[nodiscard]] std::vector<Remark> protocol_remarks(const FitResult& fit,

@@ -131,6 +131,21 @@ ProtocolSpans protocol_spans(std::span<const PreparedRecording> recordings) {
   return spans;
 }
 
+void doubt_plateau(FitResult& fit, const ProtocolSpans& spans) {
+  const auto long_for_hold = [&](const ParameterResult& p) {
+    const bool time = !p.nuisance && p.parameter.unit.dimension == Dimension::time;
+    return time && spans.too_short_to_end(p.estimate);
+  };
+  const bool seen = !(spans.hold_s > 0.0) || std::ranges::none_of(fit.parameters, long_for_hold);
+  if (seen) return;
+  for (ParameterResult& p : fit.parameters) {
+    const bool closed = p.verdict == Verdict::identified || p.verdict == Verdict::lower_only;
+    if (p.parameter.name != "k_inf" || !closed || !p.not_separable.empty()) continue;
+    p.not_separable = "the plateau or a slower branch";
+    p.summary = parameter_words(p, fit.config.level);
+  }
+}
+
 std::vector<Remark> recording_remarks(std::span<const PreparedRecording> recordings) {
   std::vector<Remark> remarks = unit_remarks(recordings);
   for (const PreparedRecording& r : recordings) {

@@ -1,0 +1,175 @@
+#include "tpm/fit/select/reading_scatter.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <map>
+#include <utility>
+#include <vector>
+
+#include "tpm/base/distributions.hpp"
+#include "tpm/base/text.hpp"
+#include "tpm/fit/adequacy.hpp"
+
+namespace tpm::fit {
+namespace {
+
+constexpr double kLevelOfScatter = 0.01;
+
+/// One reading of a curve: its size, the residual, and the residual in its noise.
+struct ScatteredReading {
+  double at = 0.0, size = 0.0, residual = 0.0, standardised = 0.0;
+};
+
+/// The readings of each quantity in the order of time or frequency; none of other data.
+std::vector<std::vector<ScatteredReading>> reading_curves(const FitResult& fit) {
+  std::map<Quantity, std::vector<ScatteredReading>> curves;
+  if (!fit.recordings.empty() || fit.config.data.size() != 1) return {};
+  for (const FittedDatum& d : fit.data) {
+    if (d.datum.held_out || !d.datum.value) continue;
+    if (!d.datum.frequency_Hz && !std::isfinite(d.datum.time_s)) return {};
+    curves[d.datum.quantity].push_back({d.datum.frequency_Hz.value_or(d.datum.time_s),
+                                        std::abs(*d.datum.value), d.predicted - *d.datum.value,
+                                        d.standardised});
+  }
+  std::vector<std::vector<ScatteredReading>> list;
+  for (auto& [quantity, readings] : curves) {
+    std::ranges::stable_sort(readings, {}, &ScatteredReading::at);
+    list.push_back(std::move(readings));
+  }
+  return list;
+}
+
+void state_not_described(FitResult& fit, const ReadingScatter& scatter, const std::string& other) {
+  LawAdequacy adequacy;
+  adequacy.verdict = described_name(Described::not_described);
+  adequacy.residual_over_noise = scatter.residual_over_scatter;
+  adequacy.summary = fmt::format(
+      "{} these readings: the residuals follow each other, {} times the scatter of neighbouring "
+      "readings{}",
+      other.empty() ? "no law tried describes"
+                    : fmt::format("{} does not describe", law_name(fit.config.law.value())),
+      times_text(scatter.residual_over_scatter),
+      other.empty() ? std::string() : fmt::format("; {} does", other));
+  fit.adequacy = std::move(adequacy);
+  for (ParameterResult& p : fit.parameters) {
+    p.only_if_described = true;
+    p.summary += "; this supposes that the law describes the data, which it does not";
+  }
+}
+
+bool follow_each_other(const std::optional<ReadingScatter>& scatter) {
+  return scatter && scatter->p_value < kLevelOfScatter;
+}
+
+/// Twice the log likelihood of second differences of the residuals, less a constant.
+double likelihood_of_floor(const std::vector<std::pair<double, double>>& differences,
+                           double floor) {
+  double squares = 0.0, logs = 0.0;
+  for (const auto& [size, off] : differences) {
+    const double sigma = floor + size;
+    squares += off * off / (sigma * sigma);
+    logs += std::log(sigma);
+  }
+  return -2.0 * logs - static_cast<double>(differences.size()) * std::log(squares);
+}
+
+}  // namespace
+
+std::optional<ReadingScatter> reading_scatter(const FitResult& fit) {
+  constexpr double kFewestPairs = 8.0, kRounding = 1e-6;
+  double pairs = 0.0, count = 0.0, squares = 0.0, products = 0.0, differences = 0.0;
+  double share = 0.0;  // of its size, the largest residual
+  for (const auto& curve : reading_curves(fit)) {
+    double largest = 0.0;
+    for (const ScatteredReading& r : curve) largest = std::max(largest, r.size);
+    for (std::size_t i = 0; i < curve.size(); ++i) {
+      const double z = curve[i].standardised;
+      squares += z * z;
+      count += 1.0;
+      // No instrument reads more decades at once.
+      const double size = std::max(curve[i].size, kRounding * largest);
+      if (size > 0.0) share = std::max(share, std::abs(curve[i].residual) / size);
+      if (i == 0) continue;
+      const double before = curve[i - 1].standardised;
+      products += before * z;
+      differences += (z - before) * (z - before);
+      pairs += 1.0;
+    }
+  }
+  const double degrees = count - static_cast<double>(fit.parameters.size());
+  const bool enough = pairs >= kFewestPairs && degrees >= 1.0 && share > kRounding;
+  if (!enough || !(squares > 0.0 && differences > 0.0)) return std::nullopt;
+  ReadingScatter scatter;
+  scatter.residual_over_scatter = std::sqrt(squares / degrees / (0.5 * differences / pairs));
+  const double z = products / squares * std::sqrt(pairs);
+  const double both = chi_squared_tail(z * z, 1.0);
+  scatter.p_value = z > 0.0 ? 0.5 * both : 1.0 - 0.5 * both;
+  return scatter;
+}
+
+void state_scatter(Selection& s) {
+  Candidate& chosen = s.candidates[s.recommended];
+  if (chosen.fit.adequacy && chosen.fit.adequacy->is_rejected()) return;
+  const auto scatter = reading_scatter(chosen.fit);
+  if (!follow_each_other(scatter)) return;
+  std::string other;
+  for (const Candidate& c : s.candidates) {
+    if (c.failed || &c == &chosen || !other.empty()) continue;
+    const auto its = reading_scatter(c.fit);
+    if (its && !follow_each_other(its)) other = law_name(c.law);
+  }
+  state_not_described(chosen.fit, *scatter, other);
+  chosen.identified = false;
+  chosen.reason = "does not describe the data";
+}
+
+void state_scatter(FitResult& fit) {
+  if (!fit.config.choice || fit.adequacy) return;
+  const auto scatter = reading_scatter(fit);
+  if (follow_each_other(scatter)) state_not_described(fit, *scatter, {});
+}
+
+std::optional<double> scatter_floor(const FitResult& fit) {
+  constexpr std::size_t kFewest = 16;
+  constexpr double kSixths = 6.0;      // variance of a second difference, in those of a reading
+  constexpr double kNeighbours = 2.0;  // second differences share readings: half as many count
+  constexpr int kSteps = 81;
+  constexpr double kDecades = 8.0;
+  const NoiseKind kind = fit.config.data.front().noise.kind;
+  if (kind != NoiseKind::relative_to_datum && kind != NoiseKind::absolute) return std::nullopt;
+  std::vector<std::pair<double, double>> differences;  // size of a reading, second difference
+  double largest = 0.0;
+  for (const auto& curve : reading_curves(fit)) {
+    if (curve.size() < kFewest) return std::nullopt;
+    for (std::size_t i = 0; i < curve.size(); ++i) {
+      largest = std::max(largest, curve[i].size);
+      if (i == 0 || i + 1 == curve.size()) continue;
+      const double off = curve[i - 1].residual - 2.0 * curve[i].residual + curve[i + 1].residual;
+      const double size = (curve[i - 1].size + curve[i].size + curve[i + 1].size) / 3.0;
+      differences.emplace_back(size, off / std::sqrt(kSixths));
+    }
+  }
+  constexpr double kExact = 1e-6;
+  const bool scattered = std::ranges::any_of(
+      differences, [&](const auto& d) { return std::abs(d.second) > kExact * d.first; });
+  if (!scattered) return std::nullopt;
+  double best = 0.0, most = -HUGE_VAL, assumed = 0.0;
+  for (int i = 0; i < kSteps; ++i) {
+    const double floor = largest * std::pow(10.0, -0.75 * kDecades + kDecades * i / (kSteps - 1));
+    const double likelihood = likelihood_of_floor(differences, floor);
+    if (i == 0 || (kind == NoiseKind::absolute && i == kSteps - 1)) assumed = likelihood;
+    if (likelihood > most) {
+      most = likelihood;
+      best = floor;
+    }
+  }
+  // On a bound of the parameter the statistic is half a chi-square.
+  if (chi_squared_tail(std::max(most - assumed, 0.0) / kNeighbours, 1.0) >= 2.0 * kLevelOfScatter) {
+    return std::nullopt;
+  }
+  return best;
+}
+
+}  // namespace tpm::fit
