@@ -11,7 +11,7 @@
 #include "tpm/base/text.hpp"
 #include "tpm/files/json.hpp"
 #include "tpm/fit/groups/group_comparison.hpp"
-#include "tpm/fit/select/specimens.hpp"
+#include "tpm/fit/groups/specimens.hpp"
 #include "tpm/fit/show/comparison_report.hpp"
 #include "tpm/fit/show/fit_answer.hpp"
 #include "tpm/fit/show/fit_csv.hpp"

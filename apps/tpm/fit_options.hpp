@@ -7,8 +7,8 @@
 
 #include "command.hpp"
 #include "recording_options.hpp"
+#include "tpm/fit/groups/young_moduli.hpp"
 #include "tpm/fit/select/selection.hpp"
-#include "tpm/fit/select/young_moduli.hpp"
 #include "tpm/law/contact_geometry.hpp"
 #include "tpm/show/short_answer.hpp"
 

@@ -9,10 +9,10 @@
 #include "fitted_parameter.hpp"
 #include "placement_studies.hpp"
 #include "tpm/fit/fitted_law.hpp"
+#include "tpm/fit/groups/specimens.hpp"
 #include "tpm/fit/predict/law_prediction.hpp"
 #include "tpm/fit/select/placement_parameters.hpp"
 #include "tpm/fit/select/selection.hpp"
-#include "tpm/fit/select/specimens.hpp"
 #include "tpm/fit/verdict.hpp"
 #include "tpmkit/error.hpp"
 

@@ -6,7 +6,7 @@
 
 #include "expected_values.hpp"
 #include "statistics_problems.hpp"
-#include "tpm/fit/select/random_effects.hpp"
+#include "tpm/fit/groups/random_effects.hpp"
 #include "tpm/fit/verdict.hpp"
 #include "tpm/fit/waterfall.hpp"
 #include "tpmkit/error.hpp"

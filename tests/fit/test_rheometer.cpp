@@ -11,9 +11,9 @@
 #include "tpm/base/random.hpp"
 #include "tpm/files/file.hpp"
 #include "tpm/files/import/recording_file.hpp"
+#include "tpm/fit/groups/young_moduli.hpp"
 #include "tpm/fit/likelihood/exchange_order.hpp"
 #include "tpm/fit/select/material_function.hpp"
-#include "tpm/fit/select/young_moduli.hpp"
 #include "tpmkit/error.hpp"
 #include "tpmkit/law_model.hpp"
 

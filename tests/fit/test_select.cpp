@@ -11,10 +11,10 @@
 #include "tpm/base/random.hpp"
 #include "tpm/files/file.hpp"
 #include "tpm/files/import/recording_file.hpp"
+#include "tpm/fit/groups/specimens.hpp"
 #include "tpm/fit/select/file_remarks.hpp"
 #include "tpm/fit/select/fit_adequacy.hpp"
 #include "tpm/fit/select/selection.hpp"
-#include "tpm/fit/select/specimens.hpp"
 #include "tpm/fit/show/fit_report.hpp"
 #include "tpmkit/law_model.hpp"
 

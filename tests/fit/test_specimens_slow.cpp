@@ -7,7 +7,7 @@
 
 #include "tpm/base/random.hpp"
 #include "tpm/fit/coverage.hpp"
-#include "tpm/fit/select/specimens.hpp"
+#include "tpm/fit/groups/specimens.hpp"
 #include "tpmkit/law_model.hpp"
 
 using namespace tpm;

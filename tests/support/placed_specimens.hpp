@@ -9,7 +9,7 @@
 #include <vector>
 
 #include "placed_recordings.hpp"
-#include "tpm/fit/select/specimens.hpp"
+#include "tpm/fit/groups/specimens.hpp"
 #include "tpm/fit/verdict.hpp"
 
 namespace tpm::test {

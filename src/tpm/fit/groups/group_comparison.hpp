@@ -5,8 +5,8 @@
 #include <vector>
 
 #include "tpm/fit/groups/group_difference.hpp"
-#include "tpm/fit/select/specimens.hpp"
-#include "tpm/fit/select/young_moduli.hpp"
+#include "tpm/fit/groups/specimens.hpp"
+#include "tpm/fit/groups/young_moduli.hpp"
 
 namespace tpm::fit {
 

@@ -1,7 +1,7 @@
 #pragma once
 #include <span>
 
-#include "tpm/fit/select/random_effects.hpp"
+#include "tpm/fit/groups/random_effects.hpp"
 
 namespace tpm::fit {
 

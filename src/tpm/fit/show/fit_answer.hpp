@@ -2,9 +2,9 @@
 #include <cstddef>
 
 #include "tpm/fit/groups/group_comparison.hpp"
+#include "tpm/fit/groups/specimens.hpp"
+#include "tpm/fit/groups/young_moduli.hpp"
 #include "tpm/fit/select/selection.hpp"
-#include "tpm/fit/select/specimens.hpp"
-#include "tpm/fit/select/young_moduli.hpp"
 #include "tpm/show/short_answer.hpp"
 
 namespace tpm::fit {

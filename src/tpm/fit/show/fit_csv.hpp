@@ -4,9 +4,9 @@
 #include <string>
 #include <vector>
 
+#include "tpm/fit/groups/specimens.hpp"
+#include "tpm/fit/groups/young_moduli.hpp"
 #include "tpm/fit/select/selection.hpp"
-#include "tpm/fit/select/specimens.hpp"
-#include "tpm/fit/select/young_moduli.hpp"
 
 namespace tpm::fit {
 

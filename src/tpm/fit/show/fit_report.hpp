@@ -4,7 +4,7 @@
 #include <string>
 #include <vector>
 
-#include "tpm/fit/select/specimens.hpp"
+#include "tpm/fit/groups/specimens.hpp"
 #include "tpm/law/contact_geometry.hpp"
 #include "tpm/show/figure.hpp"
 

@@ -7,7 +7,7 @@
 #include <limits>
 
 #include "tpm/base/text.hpp"
-#include "tpm/fit/select/random_effects.hpp"
+#include "tpm/fit/groups/random_effects.hpp"
 #include "tpmkit/error.hpp"
 
 namespace tpm::fit {

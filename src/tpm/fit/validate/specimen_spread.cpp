@@ -5,7 +5,7 @@
 #include <limits>
 
 #include "tpm/base/distributions.hpp"
-#include "tpm/fit/select/random_effects.hpp"
+#include "tpm/fit/groups/random_effects.hpp"
 #include "tpm/fit/validate/pooled.hpp"
 
 namespace tpm::fit {

@@ -1,4 +1,4 @@
-#include "tpm/fit/select/specimens.hpp"
+#include "tpm/fit/groups/specimens.hpp"
 
 #include <fmt/format.h>
 

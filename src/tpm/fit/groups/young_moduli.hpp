@@ -5,7 +5,7 @@
 
 #include "tpm/base/remark.hpp"
 #include "tpm/fit/fit.hpp"
-#include "tpm/fit/select/specimens.hpp"
+#include "tpm/fit/groups/specimens.hpp"
 #include "tpm/law/contact_geometry.hpp"
 
 namespace tpm::fit {

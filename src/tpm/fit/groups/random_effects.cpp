@@ -1,4 +1,4 @@
-#include "tpm/fit/select/random_effects.hpp"
+#include "tpm/fit/groups/random_effects.hpp"
 
 #include <fmt/format.h>
 

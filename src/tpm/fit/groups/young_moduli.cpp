@@ -1,4 +1,4 @@
-#include "tpm/fit/select/young_moduli.hpp"
+#include "tpm/fit/groups/young_moduli.hpp"
 
 #include <fmt/format.h>
 

@@ -1,12 +1,12 @@
 // Declared in tpmkit/fit.hpp.
 #include "tpm/files/import/recording_file.hpp"
 #include "tpm/fit/fitted_law.hpp"
+#include "tpm/fit/groups/specimens.hpp"
 #include "tpm/fit/petab.hpp"
 #include "tpm/fit/select/file_remarks.hpp"
 #include "tpm/fit/select/fit_adequacy.hpp"
 #include "tpm/fit/select/placement_parameters.hpp"
 #include "tpm/fit/select/selection.hpp"
-#include "tpm/fit/select/specimens.hpp"
 #include "tpmkit/error.hpp"
 #include "tpmkit/fit.hpp"
 

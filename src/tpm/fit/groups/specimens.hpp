@@ -5,7 +5,7 @@
 #include <string>
 #include <vector>
 
-#include "tpm/fit/select/random_effects.hpp"
+#include "tpm/fit/groups/random_effects.hpp"
 #include "tpm/fit/select/selection.hpp"
 
 namespace tpm::fit {
