@@ -133,7 +133,7 @@ TEST_CASE("an adequate law outside its calibration is stated with that condition
   v.requirement = "5%";
   v.applicability.resize(2);
   CHECK(conclusion_words(v) == "adequate for 5%");
-  v.applicability[1].outside = {"ramp of 2 mm/s, 2 times the fastest of the calibration"};
+  v.applicability[1].outside = {{"rate", "ramp of 2 mm/s, 2 times the fastest of the calibration"}};
   CHECK(conclusion_words(v) == "adequate for 5%; outside the calibration");
 }
 

@@ -203,7 +203,7 @@ TEST_CASE("The report of a session says how it ended and where it left the range
                           Contains("within the range that the model is good for in every cycle"));
   CHECK(std::filesystem::exists(folder / "trusted/report.html"));
   for (const std::size_t row : {500, 700}) recording.rows.at(row).flags |= kBeyondModel;
-  CHECK(summary_of(recording).beyond_model == 2);
+  CHECK(summary_of(recording).counts.beyond_model == 2);
   CHECK(summary_of(recording).first_beyond_s == 0.5);
   write_hil_report(recording, v, folder / "not", find_drawing_python());
   CHECK_THAT(read_file(folder / "not/report.md"),
