@@ -136,6 +136,11 @@ inline std::vector<ErrorCase> machine_cases() {
        machine("Time (s),Height (um),Deflection (V)\n0,0,0\n1,1,1\n")},
       {type, "height that falls", import + " --spring-constant \"0.05 N/m\"",
        machine("Time (s),Height (um),Force (nN)\n0,3,0\n1,2,1\n2,1,2\n")},
+      {type, "deflection of something else", import,
+       machine("Time (s),Height (um),Deflection (nm),Force (nN)\n0,0,0,0\n1,1,20,1\n2,2,40,2.8\n"
+               "3,3,60,5.2\n")},
+      {type, "deflection as large as the height", import,
+       machine("Time (s),Height (um),Deflection (um),Force (nN)\n0,0,0,0\n1,1,1,1\n2,2,2,2\n")},
       {type, "workbook", import, machine("\xD0\xCF\x11\xE0 workbook")},
       {type, "YAML", "data import {}/m.yaml -o {}/out", with_files({{"m.yaml", "a: 1\n"}})},
       {type, "law to be fitted", "fit {}/l.json",

@@ -360,12 +360,17 @@ std::vector<Use> recording_uses(const DelimitedTable& table, const MachineHeader
   if (sd != nullptr) {
     uses.push_back({sd, answer.quantity, Bound::sd, false, answer.dimension});
   }
+  if (const MachineColumn* bending = find_deflection_beside(header.columns, uses, options)) {
+    uses.push_back({bending, Quantity::contact_force, Bound::value, options.negate_response,
+                    Dimension::length});
+    uses.back().taken_away = true;
+  }
   return uses;
 }
 
 std::vector<CantileverColumn> cantilever_columns(const std::vector<Use>& uses) {
   std::vector<CantileverColumn> columns;
-  for (const Use& use : uses) columns.push_back({use.column, use.volts});
+  for (const Use& use : uses) columns.push_back({use.column, use.volts, use.taken_away});
   return columns;
 }
 

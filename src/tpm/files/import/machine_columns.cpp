@@ -131,6 +131,7 @@ Quantity drive_quantity(const MachineColumn& column, const ImportOptions& option
 
 std::string finding_name(const ColumnUse& use) {
   if (use.dimension == Dimension::angle) return "phase_angle";
+  if (use.taken_away) return "deflection";
   if (use.column->meaning && use.column->meaning->role == ColumnRole::loss_tangent) {
     return "loss_tangent";
   }

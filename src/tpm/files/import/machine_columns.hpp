@@ -17,6 +17,8 @@ struct ColumnUse {
   std::optional<Dimension> dimension = std::nullopt;  ///< if it is not that of the quantity
   bool clock = false;                                 ///< its fields are "11:09:16.5"
   bool volts = false;  ///< a detector's signal, which the deflection sensitivity makes a length
+  bool taken_away =
+      false;  ///< a deflection to be taken away from the height (find_deflection_beside)
 };
 
 /// The option to add to the command line. The unit itself is for the user to say.

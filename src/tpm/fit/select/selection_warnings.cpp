@@ -5,10 +5,13 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <optional>
 
+#include "tpm/base/quantity_text.hpp"
 #include "tpm/base/text.hpp"
 #include "tpm/fit/select/selection.hpp"
 #include "tpm/fit/verdict.hpp"
+#include "tpmkit/law_model.hpp"
 
 namespace tpm::fit {
 namespace {
@@ -66,6 +69,67 @@ std::vector<Remark> unit_remarks(std::span<const PreparedRecording> recordings) 
                      r.name, significant(*high - *low, 3))});
   }
   return remarks;
+}
+
+/// A hold under load that the window leaves out, and the ramps after the window.
+struct LaterHold {
+  double begin_s = 0.0, end_s = 0.0;
+  double rest_s = 0.0;  ///< where the drive rests, or rises, before the ramp that leads to it
+  int ramps = 0;
+};
+
+/// The longest hold after the window of a recording in whose window nothing is held.
+std::optional<LaterHold> later_hold_of(const PreparedRecording& r) {
+  constexpr double kLoaded = 0.1;  // of the travel from contact: less is a rest
+  const std::vector<double>& time = r.recording.time_s;
+  const std::vector<double>& drive = r.recording.drive;
+  const double begin = r.phases.contact_found ? r.phases.contact_drive : drive.front();
+  const auto held = [&](const Phase& phase) {
+    const bool still = phase.kind == PhaseKind::hold || phase.kind == PhaseKind::creep;
+    return still && drive[phase.last] - begin > kLoaded * (r.phases.peak_drive - begin);
+  };
+  std::optional<LaterHold> longest;
+  double rest_s = r.to_s;
+  int ramps = 0;
+  bool unloaded = false, rising = false;
+  for (const Phase& phase : r.phases.phases) {
+    const double first_s = time[phase.first], last_s = time[phase.last];
+    if (first_s < r.to_s) {
+      if (held(phase)) return std::nullopt;
+      continue;
+    }
+    ramps += phase.kind == PhaseKind::loading ? 1 : 0;
+    unloaded = unloaded || phase.kind == PhaseKind::unloading || phase.kind == PhaseKind::detached;
+    const bool loads = phase.kind == PhaseKind::loading || held(phase);
+    if (!loads) rest_s = phase.kind == PhaseKind::unloading ? last_s : 0.5 * (first_s + last_s);
+    rising = loads && (rising || phase.kind == PhaseKind::loading);
+    const bool longer = !longest || last_s - first_s > longest->end_s - longest->begin_s;
+    if (unloaded && held(phase) && rising && longer)
+      longest = LaterHold{first_s, last_s, rest_s, 0};
+  }
+  if (longest) longest->ramps = ramps;
+  return longest;
+}
+
+/// Why the hold is not fitted, and what fits it.
+std::string later_hold_words(const PreparedRecording& r, const LaterHold& hold,
+                             const FitConfig& config, const std::vector<double>& values) {
+  std::string contact;
+  const bool depth = r.recording.drive_quantity == Quantity::indentation_depth;
+  if (config.law && depth && !r.load_imposed) {
+    const Unit unit = shown_unit(Dimension::length);
+    const double value = values[LawModel(*config.law).index("contact")];
+    contact = fmt::format(" --contact \"{}\"", with_unit(significant(value / unit.to_si, 3), unit));
+  }
+  constexpr int kDigits = 6;
+  return fmt::format(
+      "{}: a hold of {} s ({} to {} s) and {} ramp{} after the first unloading (from {} s) are not "
+      "fitted: relaxation is seen only through the first ramp; --from-time \"{} s\"{} fits the "
+      "ramp that leads to this hold, with contact where the first ramp has it, and without the "
+      "memory of what came before",
+      r.name, significant(hold.end_s - hold.begin_s, 3), significant(hold.begin_s, kDigits),
+      significant(hold.end_s, kDigits), hold.ramps, hold.ramps == 1 ? "" : "s",
+      significant(r.to_s, kDigits), significant(hold.rest_s, 4), contact);
 }
 
 }  // namespace
@@ -158,7 +222,16 @@ std::vector<Remark> protocol_remarks(const FitResult& fit,
                                      std::span<const PreparedRecording> recordings) {
   std::vector<Remark> remarks;
   const auto [ramp_s, hold_s, step_s] = protocol_spans(recordings);
-  if (hold_s == 0.0) {
+  bool later = false;
+  for (std::size_t i = 0; i < recordings.size(); ++i) {
+    const auto hold = later_hold_of(recordings[i]);
+    if (!hold) continue;
+    later = true;
+    remarks.push_back(
+        {"hold_not_fitted", later_hold_words(recordings[i], *hold, fit.config,
+                                             model_parameters(fit.config, fit.best.natural, i))});
+  }
+  if (hold_s == 0.0 && !later) {
     remarks.push_back({"no_hold", "there is no hold: relaxation is seen only through the ramp"});
   }
   for (const PreparedRecording& r : recordings) {
