@@ -110,7 +110,9 @@ int check(const NetworkChoice& choice, const Session& session) {
 int show(const NetworkChoice& choice, const Session& session) {
   fs::path stem = choice.output;
   const fs::path ending = stem.extension();
-  if (ending == ".png" || ending == ".svg" || ending == ".pdf") stem.replace_extension();
+  const std::vector<std::string> endings{".svg", ".png", ".pdf", ".json"};
+  require_ending(choice.output, endings);
+  if (std::ranges::find(endings, ending.string()) != endings.end()) stem.replace_extension();
   const fs::path picture = stem.string() + ".json";
   will_write({picture, stem.string() + ".svg", stem.string() + ".png", stem.string() + ".pdf"},
              session.output_naming);

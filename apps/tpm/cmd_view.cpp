@@ -6,6 +6,7 @@
 
 #include "answer.hpp"
 #include "command.hpp"
+#include "common_options.hpp"
 #include "tpm/base/namespaces.hpp"
 #include "tpm/files/file.hpp"
 #include "tpm/files/file_roles.hpp"
@@ -34,6 +35,52 @@ class OrganProgress {
   std::size_t before_ = 0;
 };
 
+/// What a page shows of its file; null for what it has not.
+Json json_of(const ViewPage& page) {
+  const Json& shown = page.description;
+  const Json organ = shown.value("organ", Json::object());
+  return {{"kind", shown.at("kind")},
+          {"plots", shown.at("plots").size()},
+          {"samples", shown.value("samples", Json())},
+          {"samples_per_value", shown.value("samples_per_value", Json())},
+          {"spheres", organ.value("spheres", Json())},
+          {"organ_shown", organ.value("shown", Json())},
+          {"simulated", shown.value("simulated", Json())}};
+}
+
+Json json_of(const Viewed& viewed, const std::filesystem::path& output, std::size_t bytes) {
+  Json json{{"file", output.string()}, {"bytes", bytes}};
+  json["results"] = Json::array();
+  for (std::size_t i = 0; i < viewed.pages.size(); ++i) {
+    Json result{{"file", viewed.files[i].string()}};
+    result["title"] = viewed.pages[i].description.at("title");
+    result.update(json_of(viewed.pages[i]));
+    json["results"].push_back(std::move(result));
+  }
+  json["not_shown"] = Json::array();
+  for (const NotShown& other : viewed.not_shown) {
+    json["not_shown"].push_back({{"file", other.file.string()}, {"message", other.reason.what()}});
+  }
+  const Json alone = viewed.pages.size() == 1 ? json_of(viewed.pages.front()) : Json();
+  json.update(alone.is_null() ? Json{{"kind", "folder"}} : alone);
+  return json;
+}
+
+/// @param name of the file of several, with a colon
+void tell_result(const Json& shown, const std::string& name) {
+  say("{}{}: {}\n", name, shown.at("kind").get<std::string>(),
+      shown.at("title").get<std::string>());
+  if (shown.contains("organ")) {
+    say("{}organ: {} spheres; {}\n", name, shown["organ"]["spheres"].get<std::size_t>(),
+        shown["organ"]["shown"].get<std::string>());
+  }
+  if (shown.contains("samples")) {
+    const auto part = shown["samples_per_value"].get<std::size_t>();
+    say("{}curves: {} samples{}\n", name, shown["samples"].get<std::size_t>(),
+        part == 1 ? "" : fmt::format(", the least and the largest value of each {}", part));
+  }
+}
+
 int view(const ViewChoice& choice, const Session& session) {
   // Absolute, so that "." has the name of its folder.
   const std::filesystem::path given = std::filesystem::absolute(choice.file).lexically_normal();
@@ -41,38 +88,24 @@ int view(const ViewChoice& choice, const Session& session) {
   const std::filesystem::path output = choice.output.empty()
                                            ? name.filename().replace_extension(".html")
                                            : std::filesystem::path(choice.output);
+  require_ending(choice.output, {".html", ".htm"});
   will_write({output}, choice.output.empty() ? Naming::by_default : Naming::file);
   ViewOptions options;
   options.organ = !choice.no_organ;
   options.progress = OrganProgress();
-  const ViewPage page = view_file(shown_file(choice.file), options);
-  const std::string html = page.html();
+  const Viewed viewed = view_path(choice.file, options);
+  const std::string html = viewed.html();
   write_file(output, html);
-  const Json& shown = page.description;
   if (session.json()) {
-    say("{}", answer_text(
-                  session,
-                  Json{{"file", output.string()},
-                       {"kind", shown.at("kind")},
-                       {"bytes", html.size()},
-                       {"plots", shown.at("plots").size()},
-                       {"samples", shown.value("samples", Json())},
-                       {"samples_per_value", shown.value("samples_per_value", Json())},
-                       {"spheres", shown.contains("organ") ? shown["organ"]["spheres"] : Json()},
-                       {"organ_shown", shown.contains("organ") ? shown["organ"]["shown"] : Json()},
-                       {"simulated", shown.value("simulated", Json())}}));
+    say("{}", answer_text(session, json_of(viewed, output, html.size())));
     return 0;
   }
-  say("{}: {}\n", shown.at("kind").get<std::string>(), shown.at("title").get<std::string>());
-  if (shown.contains("organ")) {
-    say("organ: {} spheres; {}\n", shown["organ"]["spheres"].get<std::size_t>(),
-        shown["organ"]["shown"].get<std::string>());
+  for (std::size_t i = 0; i < viewed.pages.size(); ++i) {
+    const bool alone = viewed.pages.size() == 1 && viewed.not_shown.empty();
+    tell_result(viewed.pages[i].description,
+                alone ? "" : viewed.files[i].filename().string() + ": ");
   }
-  if (shown.contains("samples")) {
-    const auto part = shown["samples_per_value"].get<std::size_t>();
-    say("curves: {} samples{}\n", shown["samples"].get<std::size_t>(),
-        part == 1 ? "" : fmt::format(", the least and the largest value of each {}", part));
-  }
+  for (const NotShown& other : viewed.not_shown) say("not shown: {}\n", other.reason.what());
   say("wrote {}: open it in a browser\n", output.string());
   return 0;
 }
@@ -86,7 +119,7 @@ void add_view_command(CLI::App& app, Session& session) {
   command
       ->add_option("FILE", choice->file,
                    "HDF5 of tpm simulate, a recording of tpm hil run, law.json, figures.json or "
-                   "the JSON answer of tpm fit; or a folder with one of them")
+                   "the JSON answer of tpm fit; or a folder of them")
       ->required();
   command->add_option(
       "-o,--output", choice->output,

@@ -2,7 +2,15 @@
 #include <fmt/format.h>
 
 #include <CLI/CLI.hpp>
+#include <algorithm>
+#include <cctype>
+#include <filesystem>
 #include <string>
+#include <string_view>
+#include <vector>
+
+#include "tpm/base/text.hpp"
+#include "tpmkit/error.hpp"
 
 namespace tpm::app {
 
@@ -14,6 +22,17 @@ inline void add_verbose_option(CLI::App& command, bool& verbose, const char* suc
   command.add_flag(
       "--verbose", verbose,
       fmt::format("Print everything: {} (default: an answer of at most 25 lines)", such_as));
+}
+
+/// Throws Error(usage) for a file of --output whose ending says that it is of another kind than
+/// what is written. What begins with a digit is part of the name ("organ_0.5").
+inline void require_ending(const std::string& output, const std::vector<std::string>& endings) {
+  const std::string ending = std::filesystem::path(output).extension().string();
+  const bool kind = ending.size() > 1 && std::isalpha(static_cast<unsigned char>(ending[1])) != 0;
+  if (!kind || std::ranges::find(endings, ending) != endings.end()) return;
+  throw Error(ExitCode::usage, "-o " + output,
+              fmt::format("this command writes no file that ends in {}", printable(ending)),
+              fmt::format("{}, or no ending", fmt::join(endings, ", ")));
 }
 
 /// Adds --folder.

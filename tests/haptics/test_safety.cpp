@@ -386,6 +386,25 @@ TEST_CASE("The room before a session is that of its device, not that of the Omeg
   CHECK_THROWS_WITH(require_within(before("22 mm"), falcon),
                     Contains("the session's furthest place is 0.044 m from the hand at the start; "
                              "expected at most 0.04 m from the centre"));
+  // Commands read a session for their device; a program may run it on another one, before which
+  // no such device is opened.
+  DeviceChoice other;
+  other.kind = "falcon";
+  CHECK_THROWS_WITH(run_session(before("22 mm"), other, {}),
+                    StartsWith("device 'falcon': the session's furthest place is 0.044 m from the "
+                               "hand at the start"));
+  CHECK_THROWS_WITH(run_session_on(before("22 mm"), nullptr, falcon, {}, {}),
+                    StartsWith("device 'falcon': the session's furthest place is 0.044 m from the "
+                               "hand at the start"));
+  // Within the radius of both, but not before the stop of one: 37 mm to the surface, 20 mm deep.
+  Json along_x = test::with(weak, "/surface_before_hand", "37 mm");
+  along_x = test::with(along_x, "/indentations/depths", Json::array({"20 mm"}));
+  along_x["push"] = Json::array({1, 0, 0});
+  CHECK_THROWS_WITH(
+      require_within(parse_session(along_x, "session", {}, limits_of("sigma7")),
+                     limits_of("omega7")),
+      Contains("the session's furthest place is 0.057 m from the hand at the start along x; "
+               "expected at most 0.055 m, where the mechanism has its stop"));
   const Json far = test::with(weak, "/surface", Json::array({"0 m", "0 m", "-66 mm"}));
   CHECK_THROWS_WITH(parse_session(far, "session", {}),
                     Contains("0.078 m from the centre of the workspace; expected 0.075 m"));

@@ -9,6 +9,7 @@
 #include "simulated_scene.hpp"
 #include "temp_folder.hpp"
 #include "tpm/files/file.hpp"
+#include "tpm/files/hdf5/hdf5.hpp"
 #include "tpm/fit/show/view_fit.hpp"
 #include "tpm/haptics/session/recording.hpp"
 #include "tpm/haptics/session/session_run.hpp"
@@ -279,7 +280,7 @@ TEST_CASE("the page of a fit says first whether the law describes the data, and 
   // Of a folder the answer is shown with its figures.
   std::ofstream(folder / "selection.json") << answer.dump();
   std::ofstream(folder / "figures.json") << figures.dump();
-  const ViewPage seen = view_file(shown_file(folder.path()));
+  const ViewPage seen = view_path(folder.path()).pages.at(0);
   CHECK(seen.description.at("lead") == lead);
   CHECK(seen.description.at("plots").size() == 3);
   // So is that of a configuration.
@@ -287,7 +288,7 @@ TEST_CASE("the page of a fit says first whether the law describes the data, and 
   std::ofstream(configured / "answer.json") << fit.dump();
   std::ofstream(configured / "figures.json") << figures.dump();
   std::ofstream(configured / "law.json") << "{}";
-  const ViewPage told = view_file(shown_file(configured.path()));
+  const ViewPage told = view_path(configured.path()).pages.at(0);
   CHECK(told.description.at("lead").at(0) == lead.at(0));
   CHECK(told.description.at("table") == page.description.at("table"));
   CHECK(told.description.at("plots").size() == 3);
@@ -296,8 +297,116 @@ TEST_CASE("the page of a fit says first whether the law describes the data, and 
   Json two = figures;
   two["figures"].push_back(figures.at("figures").at(0));
   std::ofstream(drawn / "figures.json") << two.dump();
-  CHECK(view_file(shown_file(drawn.path())).description.at("title") ==
+  CHECK(view_path(drawn.path()).pages.at(0).description.at("title") ==
         drawn.path().filename().string() + ": 2 figures");
   const TempFolder empty;
-  CHECK_THROWS_WITH((void)shown_file(empty.path()), Contains("a folder without a result"));
+  CHECK_THROWS_WITH(view_path(empty.path()),
+                    Contains("is a folder without a result that tpm view shows; expected a result "
+                             "of tpm simulate"));
+}
+
+namespace {
+
+/// A file that the reader of sweeps takes for one of theirs.
+void write_sweep_like(const std::string& file) {
+  Hdf5Writer sweep(file);
+  sweep.numbers("/peak_force", {1.0, 2.0});
+  sweep.attribute("/", "sweep_fingerprint", "a");
+  sweep.commit();
+}
+
+const std::string kLawAlone = R"({"law": "linear-1", "drive": "indentation_depth",
+    "response": "contact_force", "reference_m": 0.004, "provenance": "derived",
+    "parameters": {"k_inf_N_per_m": 60, "k1_N_per_m": 45, "tau1_s": 2, "contact_m": 0,
+                   "offset_N": 0}})";
+
+std::vector<std::string> names_of(const Viewed& viewed) {
+  std::vector<std::string> names;
+  for (const auto& file : viewed.files) names.push_back(file.filename().string());
+  return names;
+}
+
+}  // namespace
+
+TEST_CASE("a folder is viewed by what its files hold, whatever their names are") {
+  const TempFolder folder;
+  const ExperimentScene scene = test::small_scene(
+      R"("protocol": {"kind": "ramp_hold", "depth": "4 mm", "rate": "4 mm/s", "hold": "1 s"},
+         "outputs": {"count": 2})");
+  const RunNetwork network = network_to_run(scene);
+  write_simulation(scene, network, simulate(scene, network), folder / "poke");
+  // One result alone is its own page.
+  std::ofstream(folder / "notes.txt") << "depth [mm],force [N]\n";
+  const Viewed alone = view_path(folder.path());
+  CHECK(names_of(alone) == std::vector<std::string>{"poke"});
+  CHECK(alone.html() == view_file(folder / "poke").html());
+
+  std::ofstream(folder / "liver.json") << kLawAlone;
+  write_sweep_like(folder / "mysweep.h5");
+  std::ofstream(folder / "scene.json") << R"({"organ": {"kind": "star"}})";
+  std::ofstream(folder / "cut.json") << R"({"figures": [)";
+  const Viewed several = view_path(folder.path());
+  CHECK(names_of(several) == std::vector<std::string>{"liver.json", "poke"});
+  REQUIRE(several.not_shown.size() == 2);
+  CHECK_THAT(several.not_shown[0].reason.what(), Contains("cut.json: parse error"));
+  CHECK_THAT(several.not_shown[1].reason.what(),
+             Contains("mysweep.h5: is the result of a sweep; expected tpm sweep plot " +
+                      (folder / "mysweep.h5")));
+  // Both stand on the page, each with its arrays under its own names.
+  const std::string html = several.html();
+  CHECK_THAT(html, Contains(R"("names":["liver.json","poke"])") && Contains("tpm sweep plot") &&
+                       Contains("id=\"result-1-description\"") &&
+                       Contains("id=\"result-2-description\""));
+  const Json& organ = several.pages.at(1).description.at("organ");
+  const std::string time = "result-2-" + organ.at("time_s").get<std::string>();
+  CHECK(numbers<double>(html, time) ==
+        numbers<double>(several.pages.at(1).html(), organ.at("time_s")));
+}
+
+TEST_CASE("a folder whose results tpm view does not show is refused with what shows them") {
+  const TempFolder folder;
+  write_sweep_like(folder / "b.h5");
+  const std::string words = "is the result of a sweep; expected tpm sweep plot ";
+  CHECK_THROWS_WITH(view_file(folder / "b.h5"), Contains(words + (folder / "b.h5")));
+  CHECK_THROWS_WITH(view_path(folder.path()), Contains(words + (folder / "b.h5")));
+  write_sweep_like(folder / "a.h5");
+  CHECK_THROWS_WITH(view_path(folder.path()),
+                    Contains("2 files that tpm view does not show, the first: ") &&
+                        Contains(words + (folder / "a.h5")));
+}
+
+TEST_CASE("a folder with more results than a page holds is refused") {
+  const TempFolder folder;
+  for (std::size_t i = 0; i <= kMostResultsOfPage; ++i) {
+    std::ofstream(folder / ("law" + std::to_string(i) + ".json")) << kLawAlone;
+  }
+  CHECK_THROWS_WITH(view_path(folder.path()),
+                    Contains("holds 51 results; expected 50 at most on one page"));
+}
+
+TEST_CASE("the page of a fit says which intervals it has, and no level that nobody stated") {
+  const TempFolder folder;
+  Json fit = Json::parse(R"({"title": "t", "model": "law", "chi_square": 1.0,
+    "confidence_level": 0.9,
+    "parameters": [{"name": "k1", "estimate_SI": 45.0, "interval_SI": [null, null],
+                    "SI_unit": "N/m", "verdict": "not profiled", "profile_SI_and_deviance": []},
+                   {"name": "k2", "estimate_SI": 45.0, "interval_SI": [null, null],
+                    "SI_unit": "N/m", "verdict": "flat",
+                    "profile_SI_and_deviance": [[44, 0.1], [45, 0], [46, 0.1]]}]})");
+  const auto viewed = [&] {
+    std::ofstream(folder / "a.json") << fit.dump();
+    return view_file(folder / "a.json").description.at("table");
+  };
+  const Json table = viewed();
+  CHECK(table.at("head").at(2) == "90 % interval");
+  CHECK(table.at("rows").at(0) == Json({"k1", "45", "-", "N/m", "not profiled"}));
+  CHECK(table.at("rows").at(1) == Json({"k2", "45", "open .. open", "N/m", "flat"}));
+  fit["confidence_level"] = 95;
+  CHECK_THROWS_WITH(viewed(), Contains("a.json: key /confidence_level: is no confidence level; "
+                                       "expected a number between 0 and 1"));
+  fit.erase("confidence_level");
+  CHECK_THROWS_WITH(viewed(), Contains("a.json: key /confidence_level: is missing; expected a "
+                                       "number between 0 and 1"));
+  fit = Json{{"fit", fit}};
+  CHECK_THROWS_WITH(viewed(), Contains("key /fit/confidence_level: is missing"));
 }

@@ -70,6 +70,7 @@ COMMANDS = [
 ]
 IS_FOLDER = {"draw_figures.py", "tpmkit.Fit.save", "sweep sensitivity"}  # their output is a folder
 IS_STEM = {"draw_network.py"}  # to which endings are added
+ENDINGS = {"view": ".html", "tpmkit.view": ".html"}  # of the output, where that of the input is refused
 GOES_ON = (".blocks",)  # what the same command takes up again
 WAYS = ("itself", "symbolic link", "hard link", "folder", "full disk")
 
@@ -99,7 +100,7 @@ def tried(tpm, root, made, name, source, typed, way):
     with tempfile.TemporaryDirectory(prefix="tpm-outputs-") as place:
         folder = Path(place) / "work"
         shutil.copytree(made, folder, symlinks=True)
-        out, prefix = "there" + (Path(source).suffix or ".json"), ()
+        out, prefix = "there" + ENDINGS.get(name, Path(source).suffix or ".json"), ()
         if way == "itself":
             out = source
         elif way == "symbolic link":

@@ -366,6 +366,44 @@ def look_at_lines(chromium, tpm, folder):
     page.check_whole()
 
 
+def look_at_folder(chromium, tpm, folder):
+    """Several results on one page: a list names them, each is shown when its name is clicked; a sweep, which is not
+    shown, is named with the command that draws it, on the page, in the text and in the JSON."""
+    there = folder / "results"
+    there.mkdir()
+    (folder / "sweep.json").write_text(json.dumps({
+        "model": "single_contact", "indentation": {"kind": "step_hold"}, "outputs": ["peak_force"],
+        "axes": [{"parameter": "depth", "from": "1 mm", "to": "2 mm", "count": 2}]}))
+    for name, depth in (("shallow", "2 mm"), ("deep", "4 mm")):
+        protocol = {"kind": "ramp_hold", "depth": depth, "rate": "4 mm/s", "hold": "1 s"}
+        (folder / "short.json").write_text(json.dumps({**SCENE, "title": name, "protocol": protocol, "outputs": {"count": 3}}))
+        subprocess.run([tpm, "simulate", folder / "short.json", "-o", there / f"{name}.h5"], check=True, capture_output=True)
+    subprocess.run([tpm, "sweep", folder / "sweep.json", "-o", there / "mysweep.h5"], check=True, capture_output=True)
+    view = [tpm, "view", there, "-o", folder / "results.html"]
+    text = subprocess.run(view, check=True, capture_output=True, text=True).stdout
+    told = json.loads(subprocess.run([*view, "--format", "json"], check=True, capture_output=True).stdout)
+    words = f"{there / 'mysweep.h5'}: is the result of a sweep; expected tpm sweep plot {there / 'mysweep.h5'}"
+    assert f"not shown: {words}\n" in text and "deep.h5: simulation: deep\n" in text, text
+    assert told["kind"] == "folder" and [Path(r["file"]).name for r in told["results"]] == ["deep.h5", "shallow.h5"], told
+    assert [one["message"] for one in told["not_shown"]] == [words], told
+    page = Page(chromium, folder / "results.html")
+    assert page.js("[...document.querySelectorAll('#contents a')].map(a => a.textContent)") == ["deep.h5", "shallow.h5"]
+    assert words in page.text("contents"), page.text("contents")
+    most = {}
+    for k, name in enumerate(("deep", "shallow"), 1):
+        if k > 1:
+            page.js(f"delete document.body.dataset.ready; document.querySelectorAll('#contents a')[{k - 1}].click()")
+            start = time.monotonic()
+            while page.js("document.body && document.body.dataset.ready") != "yes":
+                assert time.monotonic() - start < 60, "the second result does not get ready"
+                time.sleep(0.05)
+        assert page.text("title") == name, page.text("title")
+        assert page.js("document.querySelector('#contents [aria-current]').textContent") == f"{name}.h5"
+        most[name] = page.js("Math.max(...plots[0].main.y)")
+    np.testing.assert_allclose([most["deep"], most["shallow"]], [4.0, 2.0], rtol=1e-6)
+    page.check_whole()
+
+
 def main():
     program = shutil.which("chromium") or shutil.which("chromium-browser") or shutil.which("google-chrome")
     if not program:
@@ -385,9 +423,10 @@ def main():
             look_at_fit(chromium, sys.argv[1], folder)
             look_at_names(chromium, sys.argv[1], folder)
             look_at_lines(chromium, sys.argv[1], folder)
+            look_at_folder(chromium, sys.argv[1], folder)
         finally:
             chromium.close()
-    print("looked at a result, a recording and three files of a fit")
+    print("looked at a result, a recording, three files of a fit and a folder")
 
 
 if __name__ == "__main__":

@@ -152,7 +152,15 @@ inline std::vector<ErrorCase> view_cases() {
       {type, "truncated JSON", show, file(R"({"figures": [)")},
       {type, "figures that are none", show, file(R"({"figures": [{"panels": [{"x": 1}]}]})")},
       {type, "answer of a fit without estimates", show,
+       file(R"({"title": "t", "model": "m", "chi_square": 1, "confidence_level": 0.95,
+                "parameters": [{"name": "k"}]})")},
+      {type, "answer of a fit without its level", show,
        file(R"({"title": "t", "model": "m", "chi_square": 1, "parameters": [{"name": "k"}]})")},
+      {type, "folder without a result", "view {} -o {}/out.html",
+       with_files({{"c.csv", "time_s,force_N\n"}})},
+      {type, "folder with a pack of curves", "view {} -o {}/out.html", packed(1.0)},
+      {"file to write", "page that is no page", "view {}/f -o {}/out.pdf", with_files({})},
+      {"file to write", "drawing that is a page", "network show -o {}/out.html", with_files({})},
   };
 }
 

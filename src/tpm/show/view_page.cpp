@@ -40,6 +40,26 @@ std::string script_text(const Json& value) {
   return text;
 }
 
+/// pages/view.html with these elements.
+std::string page_with(std::string_view elements) {
+  std::string page = read_page("view.html");
+  const std::size_t at = page.find(kPlaceOfData);
+  if (at == std::string::npos) {
+    throw Error(ExitCode::environment, "pages/view.html", "has no place for the data",
+                "the page that belongs to this version of tpm");
+  }
+  return page.replace(at, kPlaceOfData.size(), elements);
+}
+
+std::string array_name(std::size_t index) {
+  return fmt::format("array-{}", index);
+}
+
+std::string json_element(std::string_view id, const Json& value) {
+  return fmt::format("<script type=\"application/json\" id=\"{}\">{}</script>\n", id,
+                     script_text(value));
+}
+
 template <class Number>
 std::string_view bytes_of(std::span<const Number> numbers) {
   return {reinterpret_cast<const char*>(numbers.data()), numbers.size_bytes()};
@@ -48,11 +68,8 @@ std::string_view bytes_of(std::span<const Number> numbers) {
 }  // namespace
 
 std::string ViewPage::put_bytes(std::string_view type, std::string_view bytes) {
-  std::string name = fmt::format("array-{}", count_++);
-  arrays_ += fmt::format("<script type=\"text/plain\" id=\"{}\" data-type=\"{}\">", name, type);
-  arrays_ += base64(bytes);
-  arrays_ += "</script>\n";
-  return name;
+  arrays_.push_back({type, base64(bytes)});
+  return array_name(arrays_.size() - 1);
 }
 
 std::string ViewPage::put(std::span<const float> numbers) {
@@ -79,18 +96,28 @@ void ViewPage::plot_over_time(std::string_view title, std::string_view unit, Jso
                                   {"series", std::move(series)}});
 }
 
-std::string ViewPage::html() const {
-  std::string page = read_page("view.html");
-  const std::size_t at = page.find(kPlaceOfData);
-  if (at == std::string::npos) {
-    throw Error(ExitCode::environment, "pages/view.html", "has no place for the data",
-                "the page that belongs to this version of tpm");
+std::string ViewPage::elements(std::string_view prefix) const {
+  std::string text = json_element(fmt::format("{}description", prefix), description);
+  for (std::size_t i = 0; i < arrays_.size(); ++i) {
+    text += fmt::format("<script type=\"text/plain\" id=\"{}{}\" data-type=\"{}\">", prefix,
+                        array_name(i), arrays_[i].type);
+    text += arrays_[i].base64;
+    text += "</script>\n";
   }
-  const std::string data =
-      fmt::format("<script type=\"application/json\" id=\"description\">{}</script>\n",
-                  script_text(description)) +
-      arrays_;
-  return page.replace(at, kPlaceOfData.size(), data);
+  return text;
+}
+
+std::string ViewPage::html() const {
+  return page_with(elements(""));
+}
+
+std::string html_of(const std::vector<ViewPage>& results, const std::vector<std::string>& names,
+                    const std::vector<std::string>& not_shown) {
+  std::string text = json_element("results", {{"names", names}, {"not_shown", not_shown}});
+  for (std::size_t i = 0; i < results.size(); ++i) {
+    text += results[i].elements(fmt::format("result-{}-", i + 1));
+  }
+  return page_with(text);
 }
 
 }  // namespace tpm::show

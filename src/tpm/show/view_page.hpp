@@ -1,4 +1,5 @@
 #pragma once
+#include <cstddef>
 #include <cstdint>
 #include <span>
 #include <string>
@@ -35,10 +36,23 @@ class ViewPage {
   /// The whole page. Throws Error(environment) if pages/view.html is missing or damaged.
   [[nodiscard]] std::string html() const;
 
+  /// Description and arrays as elements of a page, whose names begin with `prefix`.
+  [[nodiscard]] std::string elements(std::string_view prefix) const;
+
  private:
+  struct Array {
+    std::string_view type;  ///< "float32", a literal
+    std::string base64;
+  };
   std::string put_bytes(std::string_view type, std::string_view bytes);
-  std::string arrays_;
-  std::size_t count_ = 0;
+  std::vector<Array> arrays_;
 };
+
+/// Results as one page that shows one of them at a time and lists all at its top.
+/// @param names of the results, as they are listed
+/// @param not_shown what else was found, in words
+[[nodiscard]] std::string html_of(const std::vector<ViewPage>& results,
+                                  const std::vector<std::string>& names,
+                                  const std::vector<std::string>& not_shown);
 
 }  // namespace tpm::show

@@ -8,6 +8,7 @@
 
 #include "tpm/base/sized_unit.hpp"
 #include "tpm/base/text.hpp"
+#include "tpm/files/document_place.hpp"
 #include "tpm/files/file.hpp"
 #include "tpm/fit/likelihood/parameter.hpp"
 #include "tpm/show/view_parts.hpp"
@@ -170,6 +171,27 @@ std::string interval_text(const Json& interval, const Unit& unit) {
              : std::string("-");
 }
 
+/// The interval of a parameter; "-" where nothing was profiled, as in the text of tpm fit.
+std::string interval_of(const Json& parameter, const Unit& unit) {
+  const Json interval = parameter.value("interval_SI", Json());
+  const auto is_number = [](const Json& v) { return v.is_number(); };
+  const bool open = std::ranges::none_of(interval, is_number);
+  const bool profiled = !parameter.value("profile_SI_and_deviance", Json::array()).empty();
+  return open && !profiled ? "-" : interval_text(interval, unit);
+}
+
+/// The name of the intervals of a fit, "95 % interval".
+std::string interval_name_of(const Json& fit, const DocumentPlace& place) {
+  const Json level = fit.value("confidence_level", Json());
+  const double value = level.is_number() ? level.get<double>() : 0.0;
+  if (!(value > 0.0 && value < 1.0)) {
+    throw bad_input(place.key("confidence_level").where,
+                    level.is_null() ? "is missing" : "is no confidence level",
+                    "a number between 0 and 1, the level of the intervals");
+  }
+  return significant(100.0 * value, 3) + " % interval";
+}
+
 /// How far the deviance rises above its least value along a parameter, with the interval that is
 /// read from it.
 void add_profile(ViewPage& page, const Json& parameter, const Unit& unit,
@@ -214,18 +236,17 @@ void add_profile(ViewPage& page, const Json& parameter, const Unit& unit,
                                        {"series", std::move(series)}});
 }
 
-void add_answer(ViewPage& page, const Json& fit) {
+/// @param place of the fit in its file
+void add_answer(ViewPage& page, const Json& fit, const DocumentPlace& place) {
   page.description["title"] = fit.at("title");
   page.fact("model", fit.at("model").get<std::string>());
   Json rows = Json::array();
-  const std::string interval_name =
-      significant(100.0 * fit.value("confidence_level", 0.0), 3) + " % interval";
+  const std::string interval_name = interval_name_of(fit, place);
   for (const Json& p : fit.at("parameters")) {
     const double estimate = p.at("estimate_SI").get<double>();
     const Unit unit = read_unit(p.at("SI_unit").get<std::string>(), estimate);
     rows.push_back({p.at("name"), significant(estimate / unit.to_si, kShownDigits),
-                    interval_text(p.value("interval_SI", Json()), unit), unit.symbol,
-                    p.value("verdict", "")});
+                    interval_of(p, unit), unit.symbol, p.value("verdict", "")});
     add_profile(page, p, unit, interval_name);
   }
   page.description["table"] = {
@@ -270,6 +291,15 @@ bool is_answer(const Json& json) {
   return json.contains("parameters") && json.contains("model") && json.contains("chi_square");
 }
 
+const Json& fit_in(const Json& answer) {
+  return answer.contains("fit") ? answer.at("fit") : answer;
+}
+
+DocumentPlace place_of_fit(const Json& answer, const std::filesystem::path& file) {
+  const DocumentPlace whole{file.string()};
+  return answer.contains("fit") ? whole.key("fit") : whole;
+}
+
 /// A law, with the figures beside it if there are any.
 void add_law_and_figures(ViewPage& page, const std::filesystem::path& file) {
   add_law(page, file);
@@ -282,11 +312,11 @@ void add_law_and_figures(ViewPage& page, const std::filesystem::path& file) {
   add_figures(page, read_json(figures), figures.string());
 }
 
-/// Fills the page from whatever of a fit the file is; false if it is nothing of it.
-bool add_fit(ViewPage& page, const Json& json, const std::filesystem::path& file) {
+/// Fills the page from whatever of a fit the file is.
+void add_fit(ViewPage& page, const Json& json, FitFile is, const std::filesystem::path& file) {
   try {
-    const Json& fit = json.contains("fit") ? json.at("fit") : json;
-    if (json.contains("figures")) {
+    const Json& fit = fit_in(json);
+    if (is == FitFile::figures) {
       page.description["kind"] = "figures";
       page.description["badge"] = "FIGURES";
       const Json& figures = json.at("figures");
@@ -297,36 +327,42 @@ bool add_fit(ViewPage& page, const Json& json, const std::filesystem::path& file
                             std::filesystem::absolute(file).parent_path().filename().string(),
                             figures.size());
       add_figures(page, json, file.string());
-    } else if (is_law(json)) {
+    } else if (is == FitFile::law) {
       add_law_and_figures(page, file);
-    } else if (is_answer(fit)) {
+    } else {
       add_conclusion(page, json, fit);
       const std::filesystem::path figures = file.parent_path() / "figures.json";
-      const bool of_folder =
-          file.filename() == "selection.json" || file.filename() == "answer.json";
-      if (of_folder && std::filesystem::exists(figures)) {
+      if (is_answer_of_folder(file) && std::filesystem::exists(figures)) {
         add_figures(page, read_json(figures), figures.string());
       }
-      add_answer(page, fit);
-    } else {
-      return false;
+      add_answer(page, fit, place_of_fit(json, file));
     }
   } catch (const Json::exception& e) {
     throw bad_input(file.string(), fmt::format("is not as tpm writes it ({})", e.what()),
                     "a file that tpm has written, such as its law.json or figures.json");
   }
-  return true;
 }
 
 }  // namespace
 
+FitFile fit_file(const Json& document) {
+  if (!document.is_object()) return FitFile::none;
+  if (document.contains("figures")) return FitFile::figures;
+  if (is_law(document)) return FitFile::law;
+  return is_answer(fit_in(document)) ? FitFile::answer : FitFile::none;
+}
+
+bool is_answer_of_folder(const std::filesystem::path& file) {
+  return file.filename() == "selection.json" || file.filename() == "answer.json";
+}
+
 ViewPage fit_page(const Json& answer, const Json& figures, const std::filesystem::path& file) {
   ViewPage page = begun_page("fit", file, read_file(file));
   page.description["badge"] = "FIT";
-  const Json& fit = answer.contains("fit") ? answer.at("fit") : answer;
+  const Json& fit = fit_in(answer);
   add_conclusion(page, answer, fit);
   add_figures(page, figures, file.string());
-  add_answer(page, fit);
+  add_answer(page, fit, place_of_fit(answer, file));
   return page;
 }
 
@@ -334,10 +370,12 @@ ViewPage view_fit(const std::filesystem::path& file, std::string_view bytes) {
   const Json json = parse_json(bytes, file.string());
   ViewPage page = begun_page("fit", file, bytes);
   page.description["badge"] = "FIT";
-  if (!add_fit(page, json, file)) {
+  const FitFile is = fit_file(json);
+  if (is == FitFile::none) {
     throw bad_input(file.string(), "is JSON that tpm view does not show",
                     "law.json, figures.json or the JSON answer of tpm fit");
   }
+  add_fit(page, json, is, file);
   return page;
 }
 

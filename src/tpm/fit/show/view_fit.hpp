@@ -8,6 +8,14 @@
 
 namespace tpm::fit {
 
+/// What of a fit a JSON document is.
+enum class FitFile { none, answer, law, figures };
+[[nodiscard]] FitFile fit_file(const Json& document);
+
+/// The answer of a fit in a folder of results ("selection.json", "answer.json"), whose page shows
+/// figures.json beside it.
+[[nodiscard]] bool is_answer_of_folder(const std::filesystem::path& file);
+
 /// The page of law.json, figures.json or the JSON answer of `tpm fit`. Throws Error(bad_input) for
 /// another document.
 /// @param bytes of the file, for its text and its hash

@@ -352,9 +352,16 @@ void require_within(const HilSession& session, const DeviceLimits& limits) {
   }
   if (servo.surface_before_hand_m) {  // the start gate keeps room for it, if there is any
     if (start_room_m(session, limits) > 0.0) return;
-    const double from_hand_m = furthest_of(session, servo.surface_m) + *servo.surface_before_hand_m;
-    refuse("furthest place", fmt::format("{:.3g} m from the hand at the start", from_hand_m),
-           shortest(limits.reach_m) + " m from the centre");
+    const double before_m = *servo.surface_before_hand_m;
+    const double from_hand_m = furthest_of(session, servo.surface_m) + before_m;
+    if (from_hand_m >= limits.reach_m) {
+      refuse("furthest place", fmt::format("{:.3g} m from the hand at the start", from_hand_m),
+             shortest(limits.reach_m) + " m from the centre");
+    }
+    refuse("furthest place",
+           fmt::format("{:.3g} m from the hand at the start along x",
+                       furthest_along_x(session, before_m * servo.push)),
+           shortest(limits.stop_along_x_m) + " m, where the mechanism has its stop");
   }
   const double furthest_m = furthest_of(session, servo.surface_m);
   if (furthest_m > limits.reach_m) {

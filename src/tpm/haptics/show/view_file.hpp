@@ -1,15 +1,46 @@
 #pragma once
 #include <filesystem>
+#include <string>
+#include <vector>
 
 #include "tpm/base/namespaces.hpp"
 #include "tpm/show/view_parts.hpp"
+#include "tpmkit/error.hpp"
 
 namespace tpm::haptics {
 
-/// The file that is shown of a folder of results: selection.json or law.json of a fit,
-/// figures.json, simulation.h5; any other path is the file itself. Throws Error(bad_input) for a
-/// folder without one.
-[[nodiscard]] std::filesystem::path shown_file(const std::filesystem::path& path);
+/// Most results of a folder on one page: each holds its arrays.
+inline constexpr std::size_t kMostResultsOfPage = 50;
+
+/// A file that a command of tpm wrote and tpm view does not show.
+struct NotShown {
+  std::filesystem::path file;
+  Error reason;  ///< what it is, and what shows it
+};
+
+/// The results in a folder, as their content tells them.
+struct FolderResults {
+  std::vector<std::filesystem::path> shown;  ///< fits first, then by name
+  std::vector<NotShown> not_shown;
+};
+
+/// Looks at the files of a folder, not at those in folders of it. What the page of a fit shows
+/// anyway, its law and figures, is no result of its own. A damaged file is not shown.
+[[nodiscard]] FolderResults results_in(const std::filesystem::path& folder);
+
+/// What is shown of a path.
+struct Viewed {
+  std::vector<std::filesystem::path> files;
+  std::vector<ViewPage> pages;  ///< of these files
+  std::vector<NotShown> not_shown;
+
+  /// One page; it lists the results if there are several files.
+  [[nodiscard]] std::string html() const;
+};
+
+/// Reads a file (view_file()), or all results in a folder. Throws Error(bad_input) for a folder
+/// without a result or with more than kMostResultsOfPage.
+[[nodiscard]] Viewed view_path(const std::filesystem::path& path, const ViewOptions& options = {});
 
 /// Reads a result of `tpm simulate`, a recording of `tpm hil run` or a fit (law.json, figures.json
 /// or the JSON answer of `tpm fit`) as the page that shows it. What the file is, its bytes say, not

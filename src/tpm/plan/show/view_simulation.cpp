@@ -207,14 +207,27 @@ void add_origin(const Hdf5Reader& file, ViewPage& page) {
 
 }  // namespace
 
+std::optional<OtherKind> other_than_simulation(const Hdf5Reader& file,
+                                               const std::filesystem::path& path) {
+  if (file.has("/curve/time_s") && file.has_attribute("/", "formulation")) return std::nullopt;
+  const std::string name = shell_word(path.string());
+  if (file.has_attribute("/", "sweep_fingerprint")) {
+    return OtherKind{"is the result of a sweep", "tpm sweep plot " + name};
+  }
+  if (file.has("/rows")) {
+    return OtherKind{"is an exported session", "the recording that it was exported from"};
+  }
+  if (file.has_attribute("/", "command") && file.attribute("/", "command") == "data pack") {
+    return OtherKind{"is a pack of curves", "tpm data show " + name};
+  }
+  return OtherKind{"is an HDF5 file of another kind", kExpectedResult};
+}
+
 ViewPage view_simulation(const std::filesystem::path& path, std::string_view bytes,
                          const ViewOptions& options) {
   const Hdf5Reader file(path);
-  if (!file.has("/curve/time_s") || !file.has_attribute("/", "formulation")) {
-    const bool session = file.has("/rows");
-    throw bad_input(path.string(),
-                    session ? "is an exported session" : "is an HDF5 file of another kind",
-                    session ? "the recording that it was exported from" : kExpectedResult);
+  if (const auto other = other_than_simulation(file, path)) {
+    throw bad_input(path.string(), other->what, other->expected);
   }
   ViewPage page = begun_page("simulation", path, bytes);
   add_origin(file, page);

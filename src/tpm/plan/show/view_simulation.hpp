@@ -1,11 +1,19 @@
 #pragma once
 #include <filesystem>
+#include <optional>
 #include <string_view>
 
 #include "tpm/base/namespaces.hpp"
+#include "tpm/files/hdf5/hdf5.hpp"
+#include "tpm/files/import/file_kind.hpp"
 #include "tpm/show/view_parts.hpp"
 
 namespace tpm::plan {
+
+/// What an HDF5 file is that is no result of `tpm simulate`, and what shows it instead; none for a
+/// result.
+[[nodiscard]] std::optional<OtherKind> other_than_simulation(const Hdf5Reader& file,
+                                                             const std::filesystem::path& path);
 
 /// The page of a result of `tpm simulate`. Throws what its readers throw.
 /// @param bytes of the file, for its hash
