@@ -16,6 +16,7 @@
 #include "tpm/fit/predict/law_prediction.hpp"
 #include "tpm/fit/select/clipping.hpp"
 #include "tpm/fit/select/fit_adequacy.hpp"
+#include "tpm/fit/select/unloading_test.hpp"
 #include "tpm/fit/verdict.hpp"
 #include "tpmkit/law_file.hpp"
 #include "tpmkit/law_model.hpp"
@@ -415,4 +416,65 @@ TEST_CASE("an unloading with hysteresis contradicts a law without memory", "[ade
   const Selection elastic = selected("power", {60.0, 1.5});
   CHECK(hysteresis_of(best_of(elastic)).empty());
   CHECK_FALSE(best_of(elastic).adequacy.value().is_rejected());
+}
+
+TEST_CASE("an unloading that a law with memory does not predict contradicts it", "[adequacy]") {
+  const auto triangle = [](std::uint64_t seed, double phi, bool softened) {
+    test::PlacedTest placed;
+    placed.material = {60.0, 45.0, 0.6};
+    placed.rest_s = 2.0;
+    placed.hold_s = 0.0;
+    placed.after_s = 1.0;
+    placed.step_s = 0.02;
+    placed.noise_N = 1e-3;
+    placed.phi = phi;
+    Recording clean = test::placed(placed);
+    if (softened) {
+      // Elastic, and softer behind the largest depth: nothing relaxes (Mullins).
+      double deepest = 0.0;
+      for (std::size_t i = 0; i < clean.drive.size(); ++i) {
+        deepest = std::max(deepest, clean.drive[i]);
+        const double back = (deepest - clean.drive[i]) / 1e-3;
+        clean.response[i] =
+            80e-3 * std::pow(clean.drive[i] / 1e-3, 1.3) * (1.0 - 0.35 * std::tanh(back));
+      }
+    }
+    Random random(seed);
+    return prepare_recording("made.csv", test::measured(placed, std::move(clean), random));
+  };
+  SECTION("softening is no relaxation") {
+    const Selection s = [&] {
+      const PreparedRecording recording = triangle(65, 0.0, true);
+      SelectionOptions options;
+      options.laws = {parse_law_name("hertz-1", "test")};
+      options.only_listed = true;
+      options.held_out = false;
+      options.setup.starts = 4;
+      options.setup.profiles = false;
+      return select_law(std::span(&recording, 1), options);
+    }();
+    const LawAdequacy& adequacy = best_of(s).adequacy.value();
+    CHECK(adequacy.is_rejected());
+    REQUIRE_FALSE(adequacy.causes.empty());
+    CHECK(adequacy.causes.back().code == "unloading_differs");
+    CHECK_THAT(adequacy.summary, Contains("the unloading is not what this law predicts: off by "));
+    CHECK_FALSE(s.candidates.front().identified);
+    for (const ParameterResult& p : best_of(s).parameters) CHECK(p.only_if_described);
+  }
+  SECTION("the uncertainty of the parameters belongs to the prediction") {
+    constexpr int kRecordings = 20, kMost = 2;  // 3 or more of 20 at 1 %: 1 in 1000
+    for (const double phi : {0.0, 0.9}) {
+      int rejected = 0, tested = 0;
+      for (int i = 0; i < kRecordings; ++i) {
+        const PreparedRecording recording =
+            triangle(700 + static_cast<std::uint64_t>(i), phi, false);
+        const Selection s = selected_linear_1(recording);
+        const auto tests = test_unloading(best_of(s), data_sets(std::span(&recording, 1)));
+        tested += static_cast<int>(tests.size());
+        if (!tests.empty() && tests.front().p_value < 0.01) ++rejected;
+      }
+      CHECK(tested == kRecordings);
+      CHECK(rejected <= kMost);
+    }
+  }
 }

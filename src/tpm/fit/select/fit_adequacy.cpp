@@ -16,6 +16,7 @@
 #include "tpm/fit/select/configuration_remarks.hpp"
 #include "tpm/fit/select/law_choice.hpp"
 #include "tpm/fit/select/reading_scatter.hpp"
+#include "tpm/fit/select/unloading_test.hpp"
 #include "tpm/fit/verdict.hpp"
 
 namespace tpm::fit {
@@ -364,6 +365,31 @@ void state_hysteresis(Selection& s) {
   chosen.reason = "does not describe the unloading";
 }
 
+/// Without a hold relaxation is seen through the shape of the ramp alone: the unloading then tells
+/// whether it is one.
+void state_unloading(Selection& s, std::span<const PreparedRecording> recordings) {
+  Candidate& chosen = s.candidates[s.recommended];
+  if (chosen.fit.adequacy && chosen.fit.adequacy->is_rejected()) return;
+  if (protocol_spans(recordings).hold_s > 0.0) return;
+  const std::vector<UnloadingTest> tests = test_unloading(chosen.fit, data_sets(recordings));
+  const auto worst = std::ranges::min_element(tests, {}, &UnloadingTest::p_value);
+  if (worst == tests.end()) return;
+  if (!(worst->p_value < kLevel / static_cast<double>(tests.size()))) return;
+  const std::string differs = fmt::format(
+      "the unloading is not what this law predicts: off by {} % of the peak, {} times its "
+      "uncertainty",
+      significant(100.0 * worst->off_peak, 3), times_text(worst->times));
+  LawAdequacy adequacy = chosen.fit.adequacy.value_or(LawAdequacy{});
+  adequacy.verdict = described_name(Described::not_described);
+  adequacy.summary =
+      fmt::format("{} does not describe {}: {}; hold the depth, to see what relaxes",
+                  law_name(chosen.law), subject(chosen.fit, {{}, worst->choice}), differs);
+  adequacy.causes.push_back({"unloading_differs", differs});
+  state(chosen.fit, std::move(adequacy));
+  chosen.identified = false;
+  chosen.reason = "does not describe the unloading";
+}
+
 }  // namespace
 
 void state_better(FitResult& fit, const std::string& law, const std::string& better, double by) {
@@ -429,6 +455,7 @@ void state_adequacy(Selection& s, std::span<const PreparedRecording> recordings)
   state_of_rests(s, recordings);
   state_preferred(s);
   state_hysteresis(s);
+  state_unloading(s, recordings);
 }
 
 void state_adequacy(FitResult& fit, const std::vector<DataSet>& data) {

@@ -1,0 +1,167 @@
+#include "tpm/fit/select/unloading_test.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+#include "tpm/base/dense_algebra.hpp"
+#include "tpm/base/distributions.hpp"
+#include "tpm/base/namespaces.hpp"
+#include "tpm/fit/autoregressive.hpp"
+#include "tpm/fit/likelihood/experiment_residuals.hpp"
+#include "tpm/fit/select/recording_setup.hpp"
+
+namespace tpm::fit {
+namespace {
+
+constexpr std::size_t kFewestUnloading = 8;
+
+bool is_testable(const FitResult& fit) {
+  const FitConfig& config = fit.config;
+  const bool memory =
+      config.law && (config.law->branches > 0 || config.law->fractional != Fractional::none);
+  const bool plain = std::ranges::all_of(config.data, [](const DataChoice& d) {
+    const bool of_share =
+        d.noise.kind == NoiseKind::log || d.noise.kind == NoiseKind::relative_to_model;
+    return d.noise.shape == ErrorShape::normal && !d.estimates_sigma() && !of_share;
+  });
+  return memory && plain && config.loss.kind == Loss::none && fit.covariance.full_rank &&
+         threshold_of(fit).estimable();
+}
+
+/// Samples of the first unloading that are tested.
+std::vector<std::size_t> tested_samples(const RecordingFit& r) {
+  constexpr double kLeastShare = 0.2;  // of the peak above the response where the fit begins
+  constexpr double kRise = 0.02;       // of the range of the drive
+  constexpr std::size_t kMost = 500;   // the covariance of the noise has the square of it
+  std::vector<std::size_t> samples;
+  const auto first = std::ranges::find(r.fitted, true);
+  if (first == r.fitted.end()) return samples;
+  const auto last = std::find(r.fitted.rbegin(), r.fitted.rend(), true);
+  const auto begin = static_cast<std::size_t>(first - r.fitted.begin());
+  const auto end = static_cast<std::size_t>(r.fitted.rend() - last);
+  double deepest = r.drive[begin], peak = 0.0;
+  for (std::size_t i = begin; i < end; ++i) {
+    deepest = std::max(deepest, r.drive[i]);
+    if (!std::isfinite(r.predicted[i])) continue;
+    const double rise = r.predicted[i] - r.predicted[begin];
+    if (std::abs(rise) > std::abs(peak)) peak = rise;
+  }
+  if (peak == 0.0) return samples;
+  double shallowest = deepest;
+  for (std::size_t i = end; i < r.time_s.size() && r.drive[i] > r.drive[begin]; ++i) {
+    if (r.drive[i] > shallowest + kRise * (deepest - r.drive[begin])) break;
+    shallowest = std::min(shallowest, r.drive[i]);
+    const double predicted = (r.predicted[i] - r.predicted[begin]) / peak;
+    if (!(predicted > kLeastShare)) break;  // or no number
+    if (r.is_censored(i) || r.outlier[i]) continue;
+    if ((r.observed[i] - r.predicted[begin]) / peak <= kLeastShare) break;
+    samples.push_back(i);
+  }
+  const std::size_t stride = samples.size() / kMost + 1;
+  std::vector<std::size_t> some;
+  for (std::size_t k = 0; k < samples.size(); k += stride) some.push_back(samples[k]);
+  return some;
+}
+
+/// One row a block, which averages the samples in it.
+Eigen::MatrixXd averaging_of(Eigen::Index samples) {
+  constexpr Eigen::Index kMostBlocks = 10, kFewestInBlock = 4;
+  const Eigen::Index blocks = std::clamp<Eigen::Index>(samples / kFewestInBlock, 1, kMostBlocks);
+  Eigen::MatrixXd average = Eigen::MatrixXd::Zero(blocks, samples);
+  for (Eigen::Index b = 0; b < blocks; ++b) {
+    const Eigen::Index from = b * samples / blocks, to = (b + 1) * samples / blocks;
+    average.row(b).segment(from, to - from).setConstant(1.0 / static_cast<double>(to - from));
+  }
+  return average;
+}
+
+/// Sensitivity of standardised predictions to the free parameters in theta.
+Eigen::MatrixXd scaled_sensitivity(const FitResult& fit, const RowMatrix& sensitivity,
+                                   std::span<const Eigen::Index> rows,
+                                   const Eigen::VectorXd& scale) {
+  const auto& free = fit.covariance.free;
+  Eigen::MatrixXd scaled(std::ssize(rows), std::ssize(free));
+  for (Eigen::Index c = 0; c < scaled.cols(); ++c) {
+    const std::size_t j = free[static_cast<std::size_t>(c)];
+    const FitParameter& p = fit.parameters[j].parameter;
+    const double slope = p.natural_slope(p.theta(fit.best.natural[j]));
+    for (Eigen::Index k = 0; k < scaled.rows(); ++k) {
+      const Eigen::Index row = rows[static_cast<std::size_t>(k)];
+      scaled(k, c) = sensitivity(row, static_cast<Eigen::Index>(j)) * slope / scale[k];
+    }
+  }
+  return scaled;
+}
+
+std::optional<UnloadingTest> test_of(const FitResult& fit, const ExperimentResiduals& function,
+                                     const Experiment& experiment, const RecordingFit& r,
+                                     const RowMatrix& sensitivity) {
+  const std::vector<std::size_t> samples = tested_samples(r);
+  if (samples.size() < kFewestUnloading) return std::nullopt;
+  std::vector<Eigen::Index> rows;
+  std::vector<double> time_s;
+  Eigen::VectorXd off(std::ssize(samples)), scale(std::ssize(samples));
+  double squares = 0.0;
+  for (const std::size_t i : samples) {
+    const std::size_t datum = experiment.data[i];
+    const auto k = std::ssize(rows);
+    scale[k] = function.new_noise_scale(datum, r.predicted[i], fit.best.natural);
+    if (!(scale[k] > 0.0)) return std::nullopt;
+    off[k] = (r.predicted[i] - r.observed[i]) / scale[k];
+    rows.push_back(static_cast<Eigen::Index>(datum));
+    time_s.push_back(r.time_s[i]);
+    squares += (r.predicted[i] - r.observed[i]) * (r.predicted[i] - r.observed[i]);
+  }
+  // The variance of a slow mean is as 1 / (1 - phi)^2, and that of phi is (1 - phi^2) / n.
+  const double n = fit.value_count;
+  const double phi = fit.noise && fit.noise->correlated ? fit.noise->phi : 0.0;
+  const double of_phi = phi > 0.0 ? 4.0 * (1.0 + phi) / ((1.0 - phi) * n) : 0.0;
+  const double degrees = 2.0 / (of_phi + 2.0 / (n - static_cast<double>(fit.parameters.size())));
+  if (!(degrees >= 1.0)) return std::nullopt;
+  const double variance = fit.noise ? fit.noise->variance * fit.noise->beyond
+                                    : threshold_of(fit).variance_factor(fit.best.deviance);
+  const AutoregressiveNoise noise(phi, fit.noise ? fit.noise->step_s : median_step(r.time_s));
+  Eigen::MatrixXd correlation = Eigen::MatrixXd::Identity(off.size(), off.size());
+  for (Eigen::Index i = 0; i < off.size() && phi > 0.0; ++i) {
+    for (Eigen::Index k = 0; k < i; ++k) {
+      const double apart =
+          time_s[static_cast<std::size_t>(i)] - time_s[static_cast<std::size_t>(k)];
+      correlation(i, k) = correlation(k, i) = noise.correlation(apart);
+    }
+  }
+  const Eigen::MatrixXd average = averaging_of(off.size());
+  const Eigen::MatrixXd slopes = average * scaled_sensitivity(fit, sensitivity, rows, scale);
+  const Eigen::MatrixXd covariance =
+      variance * average * correlation * average.transpose() +
+      slopes * fit.covariance.theta_covariance() * slopes.transpose();
+  const Eigen::VectorXd mean = average * off;
+  const double contrasts = static_cast<double>(mean.size());
+  const double f = mean.dot(solve_symmetric(covariance, mean).col(0)) / contrasts;
+  if (!std::isfinite(f) || f < 0.0) return std::nullopt;
+  UnloadingTest test;
+  test.choice = r.choice;
+  test.times = std::sqrt(f);
+  test.off_peak = std::sqrt(squares / static_cast<double>(samples.size())) / r.peak;
+  test.p_value = fisher_tail(f, contrasts, degrees);
+  return test;
+}
+
+}  // namespace
+
+std::vector<UnloadingTest> test_unloading(const FitResult& fit, const std::vector<DataSet>& data) {
+  std::vector<UnloadingTest> tests;
+  if (!is_testable(fit)) return tests;
+  const ExperimentResiduals function(fit.config, data);
+  RowMatrix sensitivity;
+  static_cast<void>(function.predict(fit.best.natural, &sensitivity));
+  std::size_t place = 0;
+  for (const Experiment& experiment : function.experiments()) {
+    if (!experiment.is_recording) continue;
+    const RecordingFit& r = fit.recordings[place++];
+    if (fit.config.data[r.choice].load_imposed || is_step_response(r.response_quantity)) continue;
+    if (auto test = test_of(fit, function, experiment, r, sensitivity)) tests.push_back(*test);
+  }
+  return tests;
+}
+
+}  // namespace tpm::fit

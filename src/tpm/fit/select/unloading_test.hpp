@@ -1,0 +1,44 @@
+#pragma once
+#include <optional>
+#include <span>
+#include <vector>
+
+#include "tpm/fit/fit.hpp"
+#include "tpm/fit/likelihood/experiment.hpp"
+
+namespace tpm::fit {
+
+/// The first unloading behind the fitted part of a recording, beside its prediction.
+struct UnloadingTest {
+  std::size_t choice = 0;  ///< the recording, place in FitConfig::data
+  double times = 0.0;      ///< root of the mean square of the contrasts, each in its own
+                           ///< standard error; about 1 if the law is right
+  double off_peak = 0.0;   ///< rms difference over the largest fitted response
+  double p_value = 1.0;    ///< of a difference at least this large if the law is right
+};
+
+/// Tests whether a law with memory predicts the unloading that it was not fitted to.
+///
+/// The samples between the end of the fitted part and the loss of contact are averaged in at most
+/// 10 blocks of equal length. With the averages b of prediction less reading, the correlation R of
+/// the noise (autoregressive of first order), its variance s^2, the averaging W, the covariance C
+/// of the fitted parameters and the sensitivity J of the prediction to them,
+///
+///     F = b' V^-1 b / K,   V = s^2 W R W' + (W J) C (W J)',
+///
+/// is compared with the F distribution of K and nu degrees of freedom; phi, the correlation of
+/// neighbours, is estimated from n residuals (Satterthwaite):
+///
+///     2 / nu = 4 (1 + phi) / ((1 - phi) n) + 2 / (n - p).
+///
+/// Samples end where the drive rises again or returns to where the fit begins, and where prediction
+/// or reading has fallen to a fifth of the peak: contact may be lost there, or the probe adheres.
+///
+/// @param data one data set for each of the fit's
+/// @return one test of each recording that has at least 8 such samples; none of an imposed load, of
+///         a law without memory (hysteresis_of), or where the residuals are no plain differences or
+///         the parameters have no covariance
+[[nodiscard]] std::vector<UnloadingTest> test_unloading(const FitResult& fit,
+                                                        const std::vector<DataSet>& data);
+
+}  // namespace tpm::fit
