@@ -152,7 +152,7 @@ TEST_CASE("bonds, contacts and offsets of two recordings are found from their re
                                              searched("g1", 5e3, Scale::log, 60.0, 6e5)};
   const ReadingsFit r = fit_to_readings(*organ.model, bonds, parameters, recordings, true);
   REQUIRE(r.fit.parameters.size() == 6);
-  CHECK(r.readings == 2 * 121);
+  CHECK(r.readings == 2 * 120);
   CHECK(r.independent > 150.0);  // white noise
   // Twice as far as the limits: four standard errors.
   const auto holds = [&](std::size_t i, double value) {

@@ -344,7 +344,7 @@ TEST_CASE("Gripper, buttons and what was noted stand in the recording") {
     CHECK(recording.rows.at(501).buttons == 3);
     export_recording(recording, "", folder / "r.h5");
     const Hdf5Reader file(folder / "r.h5");
-    CHECK(file.attribute("/", "operator_code") == "op-1");
+    CHECK(file.attribute("/header/notes", "operator_code") == "op-1");
     CHECK(file.numbers("/rows/gripper_m").at(500) == static_cast<double>(0.0125F));
   }
   const test::VendorScript script(operator_lines(session, folder));

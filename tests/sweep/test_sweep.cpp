@@ -360,7 +360,7 @@ TEST_CASE("mistakes in a sweep are told in one line before anything is computed"
       {R"("end_force",)", R"("creep_depth",)", "without creep"},
       {R"("name": "share")", R"("name": "force")", "the name 'force' is taken"},
       {R"("name": "share")", R"("name": "sweep")", "the name 'sweep' is taken"},
-      {R"("name": "share")", R"("name": "force_time")", "the name 'force_time' is taken"},
+      {R"("name": "share")", R"("name": "force_time_s")", "the name 'force_time_s' is taken"},
       {R"("name": "share")", R"("name": "count_creep_depths")", "is taken"},
       {R"("parameter": "E1")", R"("parameter": "E1", "name": "status")", "'status' is taken"},
       {R"("hold": "10 s")", R"("kind2": "10 s")", "kind2"},

@@ -86,8 +86,9 @@ struct Validation {
   }
   /// The recordings are presses of a session: forces that its model answered, none measured.
   [[nodiscard]] bool of_session() const {
-    return std::ranges::all_of(
-        recordings, [](const RecordingComparison& r) { return r.part.hold_asked_s.has_value(); });
+    return !recordings.empty() && std::ranges::all_of(recordings, [](const RecordingComparison& r) {
+      return r.part.hold_asked_s.has_value();
+    });
   }
 };
 
