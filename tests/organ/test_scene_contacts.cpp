@@ -74,9 +74,8 @@ TEST_CASE("the protocol of a scene is whatever that of a contact may be") {
   const std::string motion =
       R"("protocol": {"kind": "sine", "depth": "2 mm", "frequency": "7 Hz", "cycles": 2})";
   const ExperimentScene of_scene = experiment(R"({"organ": {"kind": "star"}, )" + motion + "}");
-  const ExperimentScene of_contact =
-      experiment(R"({"organ": {"kind": "star"}, "contacts": [{"kind": "sphere", )" +
-                 motion + "}]}");
+  const ExperimentScene of_contact = experiment(
+      R"({"organ": {"kind": "star"}, "contacts": [{"kind": "sphere", )" + motion + "}]}");
   const auto& knots = of_scene.protocol.knots();
   REQUIRE(knots.size() == 129);
   REQUIRE(of_contact.protocol.knots().size() == knots.size());
