@@ -319,7 +319,9 @@ int run_hil(const RunChoice& choice, const Session& session) {
     say("{}", answer_text(session, json));
   } else {
     say("{}wrote {}\n", run_text(hil, run), choice.output);
-    if (exit_code_of(run.outcome) == 0) say("next: tpm hil verify {}\n", shell_word(choice.output));
+    if (run.outcome.cause == StopCause::finished) {
+      say("next: tpm hil verify {}\n", shell_word(choice.output));
+    }
   }
   for (const Remark& remark : run.rendering.remarks) {
     tell_user("tpm: warning: {}\n", remark.text);
