@@ -63,7 +63,8 @@ class SameAnswer(unittest.TestCase):
         self.assertEqual(beyond.warnings, [remark["text"] for remark in answer["remarks"]])
         self.assertEqual(sum(w.startswith("extrapolates: ") for w in beyond.warnings), 2)
         for words in beyond.warnings:
-            self.assertIn("warning: " + words, repr(beyond))
+            adequacy = words == beyond.adequacy["summary"]
+            self.assertIn(("adequacy: " if adequacy else "warning: ") + words, repr(beyond))
         self.assertEqual(beyond.iloc[:3].warnings, beyond.warnings)
         # The motion before the first time that is asked for counts, too.
         late = fit.predict(tpmkit.Protocol.ramp_and_hold(9e-3, 3e-3, 500.0), [503.0])
