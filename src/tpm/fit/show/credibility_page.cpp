@@ -272,7 +272,8 @@ class EvidencePage {
       const Json& a = r.at("applicability");
       std::string text;
       for (const Json& outside : a.at("outside")) {
-        text += (text.empty() ? "outside the calibration: " : "; ") + outside.get<std::string>();
+        text += text.empty() ? "outside the calibration: " : "; ";
+        text += outside.at("text").get<std::string>();
       }
       if (text.empty()) text = "inside the calibration";
       for (const Json& unknown : a.at("unknown")) {
