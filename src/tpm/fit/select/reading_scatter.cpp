@@ -41,7 +41,7 @@ std::vector<std::vector<ScatteredReading>> reading_curves(const FitResult& fit) 
   return list;
 }
 
-void state_not_described(FitResult& fit, const ReadingScatter& scatter, const std::string& other) {
+void state_not_described(FitResult& fit, const FunctionScatter& scatter, const std::string& other) {
   LawAdequacy adequacy;
   adequacy.verdict = described_name(Described::not_described);
   adequacy.residual_over_noise = scatter.residual_over_scatter;
@@ -59,7 +59,7 @@ void state_not_described(FitResult& fit, const ReadingScatter& scatter, const st
   }
 }
 
-bool follow_each_other(const std::optional<ReadingScatter>& scatter) {
+bool follow_each_other(const std::optional<FunctionScatter>& scatter) {
   return scatter && scatter->p_value < kLevelOfScatter;
 }
 
@@ -77,7 +77,7 @@ double likelihood_of_floor(const std::vector<std::pair<double, double>>& differe
 
 }  // namespace
 
-std::optional<ReadingScatter> reading_scatter(const FitResult& fit) {
+std::optional<FunctionScatter> reading_scatter(const FitResult& fit) {
   constexpr double kFewestPairs = 8.0, kRounding = 1e-6;
   double pairs = 0.0, count = 0.0, squares = 0.0, products = 0.0, differences = 0.0;
   double share = 0.0;  // of its size, the largest residual
@@ -101,7 +101,7 @@ std::optional<ReadingScatter> reading_scatter(const FitResult& fit) {
   const double degrees = count - static_cast<double>(fit.parameters.size());
   const bool enough = pairs >= kFewestPairs && degrees >= 1.0 && share > kRounding;
   if (!enough || !(squares > 0.0 && differences > 0.0)) return std::nullopt;
-  ReadingScatter scatter;
+  FunctionScatter scatter;
   scatter.residual_over_scatter = std::sqrt(squares / degrees / (0.5 * differences / pairs));
   const double z = products / squares * std::sqrt(pairs);
   const double both = chi_squared_tail(z * z, 1.0);

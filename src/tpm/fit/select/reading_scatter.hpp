@@ -6,7 +6,7 @@
 namespace tpm::fit {
 
 /// Residuals of a material function beside the scatter of neighbouring readings.
-struct ReadingScatter {
+struct FunctionScatter {
   double residual_over_scatter = 0.0;  ///< ratio of standard deviations
   double p_value =
       1.0;  ///< of residuals that follow each other as much, if readings are independent
@@ -17,7 +17,7 @@ struct ReadingScatter {
 /// make r a little smaller). The scatter is that of the differences of neighbours, over sqrt(2).
 /// @return none for other data than one material function, fewer than 8 pairs, or residuals at the
 /// level of rounding
-[[nodiscard]] std::optional<ReadingScatter> reading_scatter(const FitResult& fit);
+[[nodiscard]] std::optional<FunctionScatter> reading_scatter(const FitResult& fit);
 
 /// States that the recommended law does not describe the readings of a material function, where its
 /// residuals follow each other by more than chance (1 %).
