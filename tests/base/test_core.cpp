@@ -9,7 +9,6 @@
 #include "tpmkit/units.hpp"
 
 using namespace tpm;
-using namespace tpm::base;
 using namespace tpm::files;
 using Catch::Matchers::WithinRel;
 

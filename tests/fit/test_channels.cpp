@@ -13,7 +13,6 @@
 #include "tpm/fit/select/unseen_rises.hpp"
 
 using namespace tpm;
-using namespace tpm::base;
 using namespace tpm::fit;
 using Catch::Contains;
 using Catch::Matchers::WithinAbs;

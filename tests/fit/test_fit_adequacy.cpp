@@ -22,9 +22,6 @@
 #include "tpmkit/law_model.hpp"
 
 using namespace tpm;
-using namespace tpm::base;
-using namespace tpm::data;
-using namespace tpm::files;
 using namespace tpm::fit;
 using Catch::Contains;
 using Catch::EndsWith;

@@ -13,8 +13,6 @@
 #include "tpm/plan/operations.hpp"
 
 using namespace tpm;
-using namespace tpm::organ;
-using namespace tpm::contact;
 using namespace tpm::plan;
 
 namespace {

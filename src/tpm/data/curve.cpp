@@ -14,7 +14,6 @@
 #include "tpmkit/error.hpp"
 
 namespace tpm {
-using namespace base;
 using namespace data;
 
 namespace {
