@@ -101,6 +101,14 @@ TEST_CASE("units take the prefixes of the SI, powers, products and quotients") {
   }
 }
 
+TEST_CASE("the reason of an error is its message without what was expected") {
+  const Error error = bad_input("a.csv", "says 'x; expected y'", "a number");
+  CHECK(error.reason() == "a.csv: says 'x; expected y'");
+  CHECK(error.within("b").reason() == "b: a.csv: says 'x; expected y'");
+  CHECK(error.within("b").what() == std::string("b: ") + error.what());
+  CHECK(bad_input("a", "b").with_code(ExitCode::usage).reason() == "a: b");
+}
+
 TEST_CASE("JSON that nlohmann-json would let pass is refused") {
   CHECK_THROWS_WITH(parse_json(R"({"a": 1, "a": 2})", "f.json"),
                     "f.json: key 'a' stands twice in one object; expected each key once");

@@ -30,19 +30,13 @@ std::string devices_there(const InverseInventory& inventory) {
              : fmt::format("{} device{}: {}", count, count == 1 ? "" : "s", fmt::join(ids, ", "));
 }
 
-/// Without what was expected.
-std::string reason_of(const Error& error) {
-  const std::string_view all = error.what();
-  return std::string(all.substr(0, all.find("; expected")));
-}
-
 /// Throws Error(environment) with the port.
 InverseInventory inventory_from(const std::string& text, int port) {
   try {
     return parse_inventory(text);
   } catch (const Error& error) {
     throw service_fault(
-        fmt::format("127.0.0.1:{}: the inventory cannot be read: {}", port, reason_of(error)),
+        fmt::format("127.0.0.1:{}: the inventory cannot be read: {}", port, error.reason()),
         "a service that is compatible with the Inverse service");
   }
 }
@@ -52,7 +46,7 @@ std::unique_ptr<WebSocketClient> events_of(const InverseAddress& address) {
     return std::make_unique<WebSocketClient>(address.events_port, "/", kPatience_s,
                                              kMostMessageBytes);
   } catch (const Error& error) {
-    throw service_fault(fmt::format("no events are heard: {}", reason_of(error)),
+    throw service_fault(fmt::format("no events are heard: {}", error.reason()),
                         "the events port of the service: --inverse-events-port");
   }
 }
