@@ -71,7 +71,8 @@ struct Applicability {
 
 struct RecordingComparison {
   std::string name, sha256;
-  bool calibration = false;  ///< the law was fitted to these data
+  std::string session, press;  ///< of which the name consists; empty: no press of a session
+  bool calibration = false;    ///< the law was fitted to these data
   RecordingParts parts;
   ComparedPart part;
   ReadingScatter scatter;
@@ -114,6 +115,7 @@ struct SessionMotion {
   std::vector<Knot> knots;
   /// When the hand was asked to hold, of the recording's clock; none: it was not.
   std::optional<double> hold_asked_s;
+  std::string session = {}, press = {};  ///< names of the file and of the phase
 };
 
 struct ComparisonOptions {
