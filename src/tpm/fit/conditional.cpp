@@ -249,7 +249,7 @@ void mark_not_separable(FitResult& result) {
   for (std::size_t i = 0; i < result.parameters.size(); ++i) {
     ParameterResult& p = result.parameters[i];
     p.not_separable = result.config.parameters[i].not_separable;
-    if (!p.not_separable.empty()) p.summary = parameter_words(p, result.config.level);
+    if (p.not_separable) p.summary = parameter_words(p, result.config.level);
   }
 }
 
