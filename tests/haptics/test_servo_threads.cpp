@@ -373,7 +373,7 @@ TEST_CASE("The jitter check counts and reports") {
   HilSession session;
   session.servo.period_s = 2e-3;
   const JitterCheck check = check_jitter(device, session, 0.5, RealTimeWish::ignore);
-  CHECK_THAT(check.device.assumptions.back(),
+  CHECK_THAT(check.device.assumptions.back().text,
              Catch::Contains("a watchdog that waits 1 s at least"));
   CHECK(check.watchdog_s == session.preparation.watchdog_s);
   CHECK(check.outcome.woke_late.count() > 0);
@@ -388,7 +388,8 @@ TEST_CASE("A machine that stalls does not end an identification by the simulated
   options.real_time = true;
   const IdentifyRun run = run_identification(DeviceChoice{}, session, options);
   CHECK(run.outcome.cause != StopCause::watchdog);
-  CHECK_THAT(run.device.assumptions.back(), Catch::Contains("a watchdog that waits 1 s at least"));
+  CHECK_THAT(run.device.assumptions.back().text,
+             Catch::Contains("a watchdog that waits 1 s at least"));
 }
 
 TEST_CASE("Quantiles of times are the upper edges of their bins, and beyond the bins the largest") {

@@ -47,7 +47,7 @@ struct PlantSettings {
 };
 
 /// Assumptions among the settings, one line each.
-[[nodiscard]] std::vector<std::string> assumptions_of(const PlantSettings& settings);
+[[nodiscard]] std::vector<Remark> assumptions_of(const PlantSettings& settings);
 
 /// Motion of device and arm in a period around the place that the hand holds: distance and speed
 /// from distance, speed and a constant force, exactly.

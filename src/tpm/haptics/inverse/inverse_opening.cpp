@@ -286,14 +286,18 @@ void InverseDevice::identify() {
   identity_.hardware = !device_.simulated;
   identity_.assumptions = device_.settings.lines();
   if (events_ == nullptr) {
-    identity_.assumptions.push_back("events of the service are not heard: its version has none");
+    identity_.assumptions.push_back(
+        {"events_not_heard", "events of the service are not heard: its version has none"});
   }
-  identity_.assumptions.push_back(
+  const auto add = [&](const char* code, std::string text) {
+    identity_.assumptions.push_back({code, std::move(text)});
+  };
+  add("limit_force",
       fmt::format("at most {} N ({})", limits_.force_N, limits_.known_by("force_N")));
-  identity_.assumptions.push_back(fmt::format("{} mm from the middle of the workspace ({})",
-                                              1e3 * limits_.reach_m, limits_.known_by("reach_m")));
-  identity_.assumptions.push_back(fmt::format("at most {} N/m ({})", limits_.stiffness_N_per_m,
-                                              limits_.known_by("stiffness_N_per_m")));
+  add("limit_workspace", fmt::format("{} mm from the middle of the workspace ({})",
+                                     1e3 * limits_.reach_m, limits_.known_by("reach_m")));
+  add("limit_stiffness", fmt::format("at most {} N/m ({})", limits_.stiffness_N_per_m,
+                                     limits_.known_by("stiffness_N_per_m")));
 }
 
 const DeviceIdentity& InverseDevice::open() {
