@@ -30,7 +30,7 @@ struct QuantityComparison {
   ModelVerdict verdict = ModelVerdict::not_seen;
   double p_value = 1.0;   ///< before Holm
   bool rejected = false;  ///< beyond R (or 0) after Holm over the recording's quantities
-  /// What must shrink, or why there is no verdict.
+  /// The part of u_val that must shrink, or the reason why there is no verdict.
   std::optional<Remark> remark;
   bool unknown = false;  ///< a part of u_val is not known: the remark says which
   /// Root of the covariance of what recordings of one calibration share (law, common instrument):
