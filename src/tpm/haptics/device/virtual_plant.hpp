@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "tpm/haptics/device/operator_script.hpp"
+#include "tpmkit/error.hpp"
 
 namespace tpm::haptics {
 
