@@ -24,7 +24,7 @@ int main(int argc, char** argv) try {
     if (p.lower && p.upper) std::printf(", 95 %% interval %.4g to %.4g", *p.lower, *p.upper);
     std::string verdict(tpm::fit::verdict_name(p.verdict));
     if (p.unconfirmed) verdict = "not identified: " + p.unconfirmed->text;
-    if (!p.not_separable.empty()) verdict = "not told from a " + p.not_separable;
+    if (p.not_separable) verdict = "not told from a " + p.not_separable->text;
     std::printf(", %s\n", verdict.c_str());
   }
   if (fit.law) tpm::write_law("fitted_law.json", *fit.law);

@@ -4,7 +4,6 @@
 #include "peers.hpp"
 
 namespace tpm::peers {
-using namespace organ;
 using namespace accuracy;
 
 namespace {

@@ -18,8 +18,6 @@
 #include "tpmkit/error.hpp"
 
 using namespace tpm;
-using namespace tpm::show;
-using namespace tpm::organ;
 using namespace tpm::accuracy;
 
 namespace {

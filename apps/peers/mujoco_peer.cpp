@@ -7,7 +7,6 @@
 #include "tpmkit/error.hpp"
 
 namespace tpm::peers {
-using namespace organ;
 using namespace accuracy;
 
 namespace {

@@ -5,7 +5,6 @@
 #include "tpm/accuracy/benchmark_case.hpp"
 
 namespace tpm::peers {
-using namespace organ;
 using namespace accuracy;
 
 /// Network as an engine takes it: springs that pull along themselves, spheres with mass and drag,

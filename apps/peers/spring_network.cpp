@@ -4,7 +4,6 @@
 #include "tpmkit/error.hpp"
 
 namespace tpm::peers {
-using namespace organ;
 using namespace accuracy;
 
 SpringNetwork::SpringNetwork(const BenchmarkCase& benchmark)

@@ -2,7 +2,6 @@
 #include <fmt/format.h>
 #include <unistd.h>
 
-#include <ctime>
 #include <filesystem>
 #include <functional>
 #include <memory>
@@ -180,14 +179,6 @@ std::function<bool()> watched_keys(HilSession& session, SessionRunOptions& optio
   };
 }
 
-std::string today() {
-  const std::time_t now = std::time(nullptr);
-  std::tm utc{};
-  ::gmtime_r(&now, &utc);
-  char text[32];
-  return std::string(text, std::strftime(text, sizeof text, "%Y-%m-%dT%H:%M:%SZ", &utc));
-}
-
 /// Throws Error(usage) for a text that does not fit into a line of a report.
 void require_short(const std::string& text, const char* option) {
   constexpr std::size_t kMost = 64;
@@ -262,7 +253,7 @@ SessionRunOptions run_options(const RunChoice& choice, bool hardware) {
   require_short(choice.notes.operator_code, "--operator");
   require_short(choice.notes.subject_code, "--subject");
   // What is simulated is the same bytes each time.
-  if (hardware && options.notes.date.empty()) options.notes.date = today();
+  if (hardware && options.notes.date.empty()) options.notes.date = utc_now();
   options.wish = chosen_wish(choice.device);
   options.recording = choice.output;
   options.accept_unstable = choice.accept_unstable;

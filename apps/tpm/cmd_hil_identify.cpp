@@ -1,7 +1,6 @@
 // tpm hil identify: delay, friction and mass of a device, measured with small forces.
 #include <fmt/format.h>
 
-#include <ctime>
 #include <memory>
 #include <optional>
 #include <string>
@@ -25,14 +24,6 @@ struct IdentifyChoice {
   DeviceOptions device;
   std::string session, rate, duration = "20 s", time, output = "device.json";
 };
-
-std::string date_now() {
-  const std::time_t now = std::time(nullptr);
-  std::tm utc{};
-  ::gmtime_r(&now, &utc);
-  char text[32];
-  return std::string(text, std::strftime(text, sizeof text, "%Y-%m-%dT%H:%M:%SZ", &utc));
-}
 
 double between(const std::string& text, Dimension dimension, const char* option, double least,
                double most) {
@@ -154,7 +145,7 @@ int identify_hil(const IdentifyChoice& choice, const Session& session) {
     return InterruptWatch::exit_code();
   }
   const IdentifyRun& run = *measured;
-  const Json json = device_file_json(run, hardware ? date_now() : std::string());
+  const Json json = device_file_json(run, hardware ? utc_now() : std::string());
   if (run.counts) write_file(choice.output, to_text(json));
   if (session.json()) {
     say("{}", answer_text(session, json, {{"delay_found", run.found.delay_mean_s.has_value()}}));

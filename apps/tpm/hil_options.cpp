@@ -4,6 +4,7 @@
 #include <fmt/ranges.h>
 
 #include <algorithm>
+#include <ctime>
 #include <filesystem>
 #include <string>
 #include <vector>
@@ -129,6 +130,14 @@ void add_device_options(CLI::App& command, DeviceOptions& options) {
                   "Real-time scheduling that is refused is an error, or said and ignored")
       ->check(one_of_words({"enforce", "ignore"}))
       ->capture_default_str();
+}
+
+std::string utc_now() {
+  const std::time_t now = std::time(nullptr);
+  std::tm utc{};
+  ::gmtime_r(&now, &utc);
+  char text[32];
+  return std::string(text, std::strftime(text, sizeof text, "%Y-%m-%dT%H:%M:%SZ", &utc));
 }
 
 void warn_of_finding(const DeviceFinding& finding) {

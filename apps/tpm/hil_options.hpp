@@ -32,6 +32,9 @@ void require_libraries(const DeviceOptions& options);
 /// naming the option.
 [[nodiscard]] int listening_port(const std::string& text, const char* option);
 
+/// Date and time in UTC: "2026-01-31T12:00:00Z".
+[[nodiscard]] std::string utc_now();
+
 /// Writes a finding of a device to the user while the device is still in use.
 void warn_of_finding(const DeviceFinding& finding);
 

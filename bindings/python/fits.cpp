@@ -31,6 +31,11 @@
 namespace tpm::python {
 namespace {
 
+/// Empty where there is none.
+std::string text_of(const std::optional<Remark>& remark) {
+  return remark ? remark->text : std::string();
+}
+
 /// What a call of fit() asks for, as keywords of Python.
 struct FitRequest {
   std::vector<std::string> files;
@@ -93,18 +98,17 @@ class Fit {
     for (const ParameterResult& p : fit_.parameters) {
       const std::optional<WithDrift>& drift = p.with_drift;
       using Value = std::optional<double>;
-      rows.append(
-          py::dict(py::arg("name") = p.parameter.name, py::arg("estimate") = p.estimate,
-                   py::arg("standard_error") = p.standard_error, py::arg("lower") = p.lower,
-                   py::arg("upper") = p.upper, py::arg("unit") = si_unit(p.parameter),
-                   py::arg("verdict") = verdict_text(p), py::arg("nuisance") = p.nuisance,
-                   py::arg("only_if_described") = p.only_if_described,
-                   py::arg("not_separable") = p.not_separable,
-                   py::arg("unconfirmed") = p.unconfirmed ? p.unconfirmed->text : std::string(),
-                   py::arg("with_drift") = drift ? Value(drift->estimate) : Value(),
-                   py::arg("with_drift_lower") = drift ? drift->lower : Value(),
-                   py::arg("with_drift_upper") = drift ? drift->upper : Value(),
-                   py::arg("summary") = p.summary));
+      rows.append(py::dict(py::arg("name") = p.parameter.name, py::arg("estimate") = p.estimate,
+                           py::arg("standard_error") = p.standard_error, py::arg("lower") = p.lower,
+                           py::arg("upper") = p.upper, py::arg("unit") = si_unit(p.parameter),
+                           py::arg("verdict") = verdict_text(p), py::arg("nuisance") = p.nuisance,
+                           py::arg("only_if_described") = p.only_if_described,
+                           py::arg("not_separable") = text_of(p.not_separable),
+                           py::arg("unconfirmed") = text_of(p.unconfirmed),
+                           py::arg("with_drift") = drift ? Value(drift->estimate) : Value(),
+                           py::arg("with_drift_lower") = drift ? drift->lower : Value(),
+                           py::arg("with_drift_upper") = drift ? drift->upper : Value(),
+                           py::arg("summary") = p.summary));
     }
     return rows;
   }

@@ -55,6 +55,9 @@ enum class Quantity {
 /// The short name that begins a column header or a JSON key: "depth", "force", "time".
 [[nodiscard]] std::string_view quantity_short_name(Quantity quantity) noexcept;
 
+/// A key that ends in the SI unit of its value: "eta1_Pa_s", "storage_N_per_m", "ratio".
+[[nodiscard]] std::string si_key(std::string_view name, Dimension dimension);
+
 /// Short name and SI unit, as machine-readable output writes it: "depth_m", "relative_length".
 /// `part` ("lower", "sd") goes between the two: "force_lower_N".
 [[nodiscard]] std::string si_key(Quantity quantity, std::string_view part = {});

@@ -60,7 +60,7 @@ struct DeviceIdentity {
   /// True if motors and encoders exist, or may exist: an unknown link counts. False if the device
   /// is simulated or replayed, or if its link leads to a simulator or a network.
   bool hardware = false;
-  std::vector<std::string> assumptions;  ///< numbers that nobody has measured, one line each
+  std::vector<Remark> assumptions;  ///< numbers that nobody has measured
 };
 
 /// Mounting of a device where it differs from the default. The vendor's library uses it for gravity

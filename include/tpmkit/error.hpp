@@ -37,6 +37,10 @@ class Error : public std::runtime_error {
 
   [[nodiscard]] ExitCode code() const noexcept { return code_; }
   [[nodiscard]] ErrorCause cause() const noexcept { return cause_; }
+  /// The message without what was expected.
+  [[nodiscard]] std::string_view reason() const noexcept {
+    return std::string_view(what()).substr(0, reason_size_);
+  }
 
   /// Adds an outer place in front ("fit.json" before "key 'E'"), for an inner function that does
   /// not know its file.
@@ -49,6 +53,7 @@ class Error : public std::runtime_error {
  private:
   ExitCode code_;
   ErrorCause cause_ = ErrorCause::unspecified;
+  std::size_t reason_size_ = 0;
 };
 
 /// Shorthand for an Error(bad_input).

@@ -42,8 +42,8 @@ struct FittedParameter {
   /// The law does not describe the data: estimate, limits and verdict hold only if it did.
   bool only_if_described = false;
   /// Effects that the recording cannot separate from it ("drift or a slow branch"): it is then not
-  /// identified, whatever the verdict. Empty: nothing.
-  std::string not_separable;
+  /// identified, whatever the verdict.
+  std::optional<Remark> not_separable = std::nullopt;
   /// The second answer, where no rest tells a drift of the zero: `lower` and `upper` hold its
   /// interval, too.
   std::optional<WithDrift> with_drift = std::nullopt;

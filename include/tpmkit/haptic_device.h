@@ -76,7 +76,7 @@ typedef struct tpm_device_description {
   tpm_device_limits limits;
 } tpm_device_description;
 
-/** How the device is set up before a session. */
+/** Settings of the device before a session. */
 typedef struct tpm_device_preparation {
   uint32_t size;
   uint32_t version;
@@ -135,7 +135,7 @@ typedef struct tpm_device_plugin {
   int (*enable_forces)(void *device, char *message);
 } tpm_device_plugin;
 
-/** What a plugin exports. The struct lives as long as the library is loaded. */
+/** The functions that a plugin exports. The struct lives as long as the library is loaded. */
 const tpm_device_plugin *tpm_device_plugin_get(void);
 
 #ifdef __cplusplus

@@ -79,7 +79,7 @@ enum tpm_haptics_cause {
   TPM_HAPTICS_TOO_MUCH_DAMPING = 11     /**< damping had to be added in too many steps */
 };
 
-/** What happened in a step, bits of tpm_haptics_state.flags. */
+/** Events of a step, bits of tpm_haptics_state.flags. */
 enum tpm_haptics_flag {
   TPM_HAPTICS_TOUCHING = 1u << 0,
   TPM_HAPTICS_FORCE_LIMITED = 1u << 1, /**< by the session's limit, or while it grows to it */
@@ -95,7 +95,7 @@ enum tpm_haptics_flag {
 /** A tissue at the tool. */
 typedef struct tpm_haptics_contact tpm_haptics_contact;
 
-/** How a contact is opened. TPM_HAPTICS_OPTIONS_INIT sets the defaults. */
+/** Options for opening a contact. TPM_HAPTICS_OPTIONS_INIT sets the defaults. */
 typedef struct tpm_haptics_options {
   uint32_t size;
   uint32_t version;

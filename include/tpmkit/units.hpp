@@ -48,8 +48,6 @@ struct Unit {
 
 /// The SI unit symbol of a dimension ("" for dimensionless).
 [[nodiscard]] std::string_view si_symbol(Dimension dimension) noexcept;
-/// A key that ends in the SI unit of its value: "eta1_Pa_s", "storage_N_per_m", "ratio".
-[[nodiscard]] std::string si_key(std::string_view name, Dimension dimension);
 
 /// The usual unit for soft tissue: mm, N, kPa, s, Hz; otherwise the SI unit.
 [[nodiscard]] Unit shown_unit(Dimension dimension);

@@ -5,7 +5,6 @@
 #include "tpm/accuracy/show/benchmark_report.hpp"
 
 using namespace tpm;
-using namespace tpm::files;
 using namespace tpm::accuracy;
 
 TEST_CASE("schema and reader of a benchmark's results agree on odd ones", "[keys]") {

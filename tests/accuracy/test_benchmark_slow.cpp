@@ -16,9 +16,6 @@
 #include "tpm/files/json.hpp"
 
 using namespace tpm;
-using namespace tpm::files;
-using namespace tpm::show;
-using namespace tpm::organ;
 using namespace tpm::accuracy;
 using Catch::Matchers::Contains;
 using Catch::Matchers::WithinRel;

@@ -6,7 +6,6 @@
 #include "tpm/accuracy/verify/certified_fit.hpp"
 
 using namespace tpm;
-using namespace tpm::fit;
 using namespace tpm::accuracy;
 using Catch::Matchers::WithinRel;
 

@@ -7,7 +7,6 @@
 #include "tpm/files/file.hpp"
 
 using namespace tpm;
-using namespace tpm::files;
 using namespace tpm::accuracy;
 using Catch::Matchers::Contains;
 using test::refusal_of;

@@ -6,7 +6,6 @@
 #include "tpm/accuracy/stability/verdict.hpp"
 
 using namespace tpm;
-using namespace tpm::organ;
 using namespace tpm::accuracy;
 
 TEST_CASE(

@@ -16,7 +16,6 @@
 #include "tpmkit/error.hpp"
 
 using namespace tpm;
-using namespace tpm::files;
 using namespace tpm::accuracy;
 using Catch::Matchers::Contains;
 

@@ -9,7 +9,6 @@
 #include "tpmkit/units.hpp"
 
 using namespace tpm;
-using namespace tpm::base;
 using namespace tpm::files;
 using Catch::Matchers::WithinRel;
 
@@ -100,6 +99,14 @@ TEST_CASE("units take the prefixes of the SI, powers, products and quotients") {
     INFO(wrong);
     CHECK_FALSE(is_unit(wrong));
   }
+}
+
+TEST_CASE("the reason of an error is its message without what was expected") {
+  const Error error = bad_input("a.csv", "says 'x; expected y'", "a number");
+  CHECK(error.reason() == "a.csv: says 'x; expected y'");
+  CHECK(error.within("b").reason() == "b: a.csv: says 'x; expected y'");
+  CHECK(error.within("b").what() == std::string("b: ") + error.what());
+  CHECK(bad_input("a", "b").with_code(ExitCode::usage).reason() == "a: b");
 }
 
 TEST_CASE("JSON that nlohmann-json would let pass is refused") {

@@ -8,8 +8,6 @@
 #include "tpmkit/error.hpp"
 
 using namespace tpm;
-using namespace tpm::files;
-using namespace tpm::organ;
 using namespace tpm::contact;
 using namespace tpm::testing;
 

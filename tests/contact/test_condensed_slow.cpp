@@ -7,7 +7,6 @@
 #include "tpm/organ/scene/scene.hpp"
 
 using namespace tpm;
-using namespace tpm::organ;
 using namespace tpm::contact;
 using namespace tpm::testing;
 

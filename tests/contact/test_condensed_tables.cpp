@@ -7,8 +7,6 @@
 #include "tpm/contact/condensed/condensed_fit.hpp"
 
 using namespace tpm;
-using namespace tpm::base;
-using namespace tpm::organ;
 using namespace tpm::contact;
 
 namespace {

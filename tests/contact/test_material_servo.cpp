@@ -15,9 +15,6 @@
 #include "tpmkit/error.hpp"
 
 using namespace tpm;
-using namespace tpm::base;
-using namespace tpm::law;
-using namespace tpm::organ;
 using namespace tpm::contact;
 using tpm::testing::OrganScene;
 

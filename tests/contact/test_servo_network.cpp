@@ -15,10 +15,6 @@
 #include "tpmkit/tpm_element.hpp"
 
 using namespace tpm;
-using namespace tpm::base;
-using namespace tpm::law;
-using namespace tpm::organ;
-using namespace tpm::contact;
 using namespace tpm::accuracy;
 using tpm::testing::OrganScene;
 

@@ -1,7 +1,7 @@
 #pragma once
 #include <dlfcn.h>
 
-/// Which calls fail is known to fault_at.cpp. Not seen by the program: its names stay its own.
+/// fault_at.cpp lists the calls that fail. Not seen by the program: its names stay its own.
 #pragma GCC visibility push(hidden)
 namespace fault_at {
 

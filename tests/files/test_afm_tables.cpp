@@ -6,38 +6,17 @@
 #include <catch2/catch.hpp>
 #include <cmath>
 #include <string>
-#include <string_view>
 
-#include "temp_folder.hpp"
-#include "tpm/files/file.hpp"
-#include "tpm/files/import/reading_options.hpp"
-#include "tpm/files/import/recording_file.hpp"
-#include "tpmkit/error.hpp"
+#include "table_reader.hpp"
 
 using namespace tpm;
 using namespace tpm::files;
 using Catch::Contains;
 using Catch::Matchers::WithinRel;
-using test::TempFolder;
+using test::TableReader;
+using test::with;
 
 namespace {
-
-class AfmReader {
- public:
-  RecordingFile operator()(const std::string& text, const ImportOptions& options = {}) const {
-    write_file(folder_ / "afm.txt", text);
-    return read_recording_file(folder_ / "afm.txt", options);
-  }
-  RecordingFile operator()(const std::string& text, std::string_view key,
-                           const std::string& value) const {
-    ImportOptions options;
-    set_reading_option(options, key, value, "test");
-    return (*this)(text, options);
-  }
-
- private:
-  TempFolder folder_;
-};
 
 const std::string kAfmTitles = "Time [s],Height [um],Deflection [nm],Force [nN]\n";
 const std::string kAfmRows = "0,0,0,0\n1,1,20,1\n2,2,40,2\n3,3,80,4\n";  // 0.05 N/m
@@ -45,7 +24,7 @@ const std::string kAfmRows = "0,0,0,0\n1,1,20,1\n2,2,40,2\n3,3,80,4\n";  // 0.05
 }  // namespace
 
 TEST_CASE("a deflection in nm beside a force is taken away from the height of an AFM") {
-  const AfmReader read;
+  const TableReader read;
   const RecordingFile file = read(kAfmTitles + kAfmRows);
   CHECK_THAT(file.recording.drive.back(), WithinRel(3e-6 - 80e-9, 1e-12));
   CHECK_THAT(file.recording.response.back(), WithinRel(4e-9, 1e-12));
@@ -65,11 +44,12 @@ TEST_CASE("a deflection in nm beside a force is taken away from the height of an
 }
 
 TEST_CASE("options and other deflections leave the height of an AFM as they say") {
-  const AfmReader read;
-  const RecordingFile chosen = read(kAfmTitles + kAfmRows, "drive", "Height");
+  const TableReader read;
+  const RecordingFile chosen = read(kAfmTitles + kAfmRows, with("drive", "Height"));
   CHECK_THAT(chosen.recording.drive.back(), WithinRel(3e-6, 1e-12));
   CHECK_THAT(columns_words(chosen.findings), Contains("warning: column 2 'Height'"));
-  const Recording stiffer = read(kAfmTitles + kAfmRows, "spring_constant", "0.1 N/m").recording;
+  const Recording stiffer =
+      read(kAfmTitles + kAfmRows, with("spring_constant", "0.1 N/m")).recording;
   CHECK_THAT(stiffer.drive.back(), WithinRel(3e-6 - 40e-9, 1e-12));
 
   // Volts, and two deflections, tell no depth; a column of the depth goes before.
@@ -89,7 +69,7 @@ TEST_CASE("options and other deflections leave the height of an AFM as they say"
 }
 
 TEST_CASE("a deflection that the force does not follow is refused as that of an AFM") {
-  const AfmReader read;
+  const TableReader read;
   // How far a specimen bends: few samples, and many with noise.
   CHECK_THROWS_WITH(read(kAfmTitles + "0,0,0,0\n1,1,20,1\n2,2,40,2.8\n3,3,60,5.2\n4,4,80,8\n"),
                     Contains("column 3 'Deflection'") && Contains("one positive stiffness") &&

@@ -21,7 +21,6 @@
 #include "tpmkit/error.hpp"
 
 using namespace tpm;
-using namespace tpm::base;
 using namespace tpm::files;
 using test::TempFolder;
 

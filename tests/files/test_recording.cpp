@@ -11,7 +11,6 @@
 #include "tpm/files/import/recording_file.hpp"
 
 using namespace tpm;
-using namespace tpm::data;
 using namespace tpm::files;
 using Catch::Matchers::WithinAbs;
 using Catch::Matchers::WithinRel;

@@ -6,14 +6,11 @@
 #include <cmath>
 #include <functional>
 
-#include "temp_folder.hpp"
-#include "tpm/files/file.hpp"
+#include "table_reader.hpp"
 #include "tpm/files/import/clock_text.hpp"
 #include "tpm/files/import/column_title.hpp"
 #include "tpm/files/import/file_kind.hpp"
 #include "tpm/files/import/header_words.hpp"
-#include "tpm/files/import/reading_options.hpp"
-#include "tpm/files/import/recording_file.hpp"
 #include "tpm/files/import/step_clock.hpp"
 #include "tpm/files/number_style.hpp"
 #include "tpmkit/error.hpp"
@@ -22,36 +19,10 @@ using namespace tpm;
 using namespace tpm::files;
 using Catch::Contains;
 using Catch::Matchers::WithinRel;
-using test::TempFolder;
+using test::TableReader;
+using test::with;
 
 namespace {
-
-/// Reads a text as tpm fit does.
-class Reader {
- public:
-  RecordingFile operator()(const std::string& text, const ImportOptions& options = {}) const {
-    write_file(folder_ / "table.txt", text);
-    return read_recording_file(folder_ / "table.txt", options);
-  }
-  /// The message of the refusal, or "read".
-  std::string refusal(const std::string& text, const ImportOptions& options = {}) const {
-    try {
-      static_cast<void>((*this)(text, options));
-    } catch (const Error& error) {
-      return error.what();
-    }
-    return "read";
-  }
-
- private:
-  TempFolder folder_;
-};
-
-ImportOptions with(std::string_view key, const std::string& text) {
-  ImportOptions options;
-  set_reading_option(options, key, text, "test");
-  return options;
-}
 
 /// Rows of time in s, ramp to 4 mm in 2 s, and k_inf = 60 N/m with a branch of 45 N/m, 2 s.
 std::string ramp_rows(const std::string& pattern, int rows = 61) {
@@ -75,7 +46,7 @@ std::string with_commas(std::string text) {
 }  // namespace
 
 TEST_CASE("marks of thousands are told from decimal signs by the whole column") {
-  const Reader read;
+  const TableReader read;
   const std::string head = "Time [s]\tDepth [um]\tForce [uN]\n";
   for (const std::string mark : {",", ".", "'", " ", "\xC2\xA0", "\xE2\x80\xAF"}) {
     INFO(mark);
@@ -133,7 +104,7 @@ TEST_CASE("numbers in a style: groups of three, one decimal sign, any minus") {
 }
 
 TEST_CASE("a clock that ran before the step is refused, and --step-time tells it") {
-  const Reader read;
+  const TableReader read;
   const auto step = [](double start, double every, const char* title) {
     std::string text = fmt::format("{}\tStrain\tStress\ns\t%\tPa\n", title);
     for (int i = 1; i <= 200; ++i) {
@@ -211,7 +182,7 @@ TEST_CASE("what was asked for, limits and other quantities have no meaning") {
   }
   CHECK(recognize_title("Stretch ratio"));
   CHECK(recognize_title("SD of force")->role == ColumnRole::sd);
-  const Reader read;
+  const TableReader read;
   const std::string rows = ramp_rows("{0:.1f},{1:.4f},{1:.3f},{2:.5f}\n");
   const RecordingFile file = read("Time [s],Depth command [mm],Depth [mm],Force [N]\n" + rows);
   CHECK_THAT(columns_words(file.findings),
@@ -223,7 +194,7 @@ TEST_CASE("what was asked for, limits and other quantities have no meaning") {
 }
 
 TEST_CASE("two columns of one rank are refused where their numbers differ") {
-  const Reader read;
+  const TableReader read;
   const std::string same = ramp_rows("{0:.1f},{1:.4f},{2:.5f},{2:.5f}\n");
   CHECK(read("Time [s],Depth [mm],Force A [N],Force B [N]\n" + same).recording.drive.size() == 61);
   std::string differ = "Time [s],Depth [mm],Force1 [N],Force2 [N]\n";
@@ -253,7 +224,7 @@ TEST_CASE("a numbered title has no unit, and a strain without one is refused") {
   CHECK(split_title("Force/N").name == "Force");
   CHECK(split_title("Force/s").unit.empty());
   CHECK(recognize_title("Force2")->role == ColumnRole::response);
-  const Reader read;
+  const TableReader read;
   const auto strains = [](const char* title, double largest) {
     std::string text = fmt::format("Time (s),{},Stress (kPa)\n", title);
     for (int i = 0; i <= 40; ++i) {
@@ -273,7 +244,7 @@ TEST_CASE("a numbered title has no unit, and a strain without one is refused") {
 }
 
 TEST_CASE("tables in every layout give the same recording") {
-  const Reader read;
+  const TableReader read;
   const std::string titles = "Zeit [s];Weg [mm];Kraft [N]\n";
   const std::string rows = with_commas(ramp_rows("{:.2f};{:.4f};{:.5f}\n"));
   const Recording plain = read(titles + rows).recording;
@@ -312,7 +283,7 @@ TEST_CASE("tables in every layout give the same recording") {
 }
 
 TEST_CASE("inches, pounds and bytes that are not UTF-8") {
-  const Reader read;
+  const TableReader read;
   const Recording r =
       read(
           "\"Time\",\"Extension\",\"Load\"\n\"(s)\",\"(in)\",\"(lbf)\"\n"
@@ -331,7 +302,7 @@ TEST_CASE("inches, pounds and bytes that are not UTF-8") {
 }
 
 TEST_CASE("units are read as machines write them, and weights ask for the force that is meant") {
-  const Reader read;
+  const TableReader read;
   const auto seconds = [&](const std::string& unit) {
     return read("Elapsed Time\tDisp\tLoad\n" + unit + "\tmm\tN\n0\t0\t0\n1\t1\t1\n2\t1\t0.5\n")
         .recording;
@@ -357,7 +328,7 @@ TEST_CASE("units are read as machines write them, and weights ask for the force 
 }
 
 TEST_CASE("a unit is said of a column by its name, whole title or number, and of no other") {
-  const Reader read;
+  const TableReader read;
   const std::string table = "time (s),depth (mm),force (N)\n0,0,0\n1,1,1\n2,1,0.5\n";
   for (const char* selector : {"force", "force (N)", "3"}) {
     INFO(selector);
@@ -378,7 +349,7 @@ TEST_CASE("a unit is said of a column by its name, whole title or number, and of
 }
 
 TEST_CASE("a column of another title is time, drive or force if nothing else can be") {
-  const Reader read;
+  const TableReader read;
   const auto table = [](const std::string& titles) {
     return titles + "\n0,0,0,5\n1,1,1,5\n2,1,0.5,5\n";
   };
@@ -409,7 +380,7 @@ TEST_CASE("times of day and of a stopwatch are seconds") {
   CHECK(find_clock_seconds("3:00:01 PM") == 54001.0);
   CHECK(find_clock_seconds("01:23.5") == 83.5);
   CHECK_FALSE(find_clock_seconds("01:23"));  // minutes and seconds, or hours and minutes
-  const Reader read;
+  const TableReader read;
   const Recording r = read(
                           "Time,Depth [mm],Force [N]\n23:59:59.0,0,0\n23:59:59.5,1,1\n"
                           "00:00:00.0,2,2\n00:00:00.5,3,3\n")
@@ -418,7 +389,7 @@ TEST_CASE("times of day and of a stopwatch are seconds") {
 }
 
 TEST_CASE("the table of an AFM: depth is height minus deflection") {
-  const Reader read;
+  const TableReader read;
   // k = 0.05 N/m: a force of 1 nN bends the cantilever by 20 nm.
   const std::string head = "Time [s],Height [um],Force [nN]\n";
   const std::string rows = "0,0,0\n1,1,1\n2,2,2\n3,3,4\n";
@@ -467,7 +438,7 @@ TEST_CASE("the options of reading have one text form for all who read") {
   CHECK(texts.size() == said.size());
   CHECK_THROWS_WITH(with("decimals", "comma"), Contains("unknown option 'decimals'"));
   CHECK_THROWS_WITH(with("decimal", "semicolon"), Contains("point, comma"));
-  const Reader read;
+  const TableReader read;
   ImportOptions window = with("from", "2 s");
   set_reading_option(window, "until", "4 s", "test");
   const Recording r =

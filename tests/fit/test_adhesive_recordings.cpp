@@ -12,7 +12,6 @@
 #include "tpmkit/law_model.hpp"
 
 using namespace tpm;
-using namespace tpm::base;
 using namespace tpm::fit;
 using Catch::Matchers::Contains;
 using Catch::Matchers::WithinAbs;

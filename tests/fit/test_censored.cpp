@@ -6,7 +6,6 @@
 #include "tpm/fit/likelihood/noise.hpp"
 
 using namespace tpm;
-using namespace tpm::base;
 using namespace tpm::fit;
 using Catch::Matchers::WithinAbs;
 using Catch::Matchers::WithinRel;

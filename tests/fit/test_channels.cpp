@@ -13,7 +13,6 @@
 #include "tpm/fit/select/unseen_rises.hpp"
 
 using namespace tpm;
-using namespace tpm::base;
 using namespace tpm::fit;
 using Catch::Contains;
 using Catch::Matchers::WithinAbs;
@@ -125,9 +124,24 @@ TEST_CASE("contact within a jump is said with the option that states it", "[chan
            sentence.find("--contact \"0 mm\"") != std::string::npos;
   });
   CHECK(said);
+  // Whether contact is fitted follows from what a parameter sets, not from its name.
+  FitConfig config = s.candidates[s.recommended].fit.config;
+  const std::vector<LawParameter> table = law_parameters(config.law.value());
+  const auto setting = [&](const char* name, const char* target) {
+    EstimatedParameter p;
+    p.fit.name = name;
+    p.sets = {{static_cast<std::size_t>(std::ranges::find(table, target, &LawParameter::name) -
+                                        table.begin()),
+               {}}};
+    return p;
+  };
+  config.parameters = {setting("contact_stiffness", "k_inf")};
+  CHECK_THAT(contact_in_jump_words(jumped, config), Contains("every coefficient supposes 0 mm"));
+  config.parameters.push_back(setting("touch", "contact"));
+  CHECK_THAT(contact_in_jump_words(jumped, config), Contains("contact is fitted"));
   const PreparedRecording ramped =
       prepare_recording("ramp.csv", pressed_at_steps(ramp_of_two_seconds, 30.0, 2e-4));
-  const FitConfig config = selected_of_channels(ramped).candidates.front().fit.config;
+  config = selected_of_channels(ramped).candidates.front().fit.config;
   CHECK(contact_in_jump_words(ramped, config).empty());
   // A ramp of few samples is no jump, though each of them is more than a tenth of the travel.
   const auto coarse = [](double t) {

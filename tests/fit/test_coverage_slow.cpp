@@ -5,7 +5,6 @@
 #include "tpm/fit/coverage.hpp"
 
 using namespace tpm;
-using namespace tpm::organ;
 using namespace tpm::fit;
 
 namespace {

@@ -9,9 +9,6 @@
 #include "tpmkit/error.hpp"
 
 using namespace tpm;
-using namespace tpm::files;
-using namespace tpm::show;
-using namespace tpm::organ;
 using namespace tpm::fit;
 using Catch::Matchers::Contains;
 using Catch::Matchers::WithinAbs;

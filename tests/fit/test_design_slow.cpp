@@ -4,7 +4,6 @@
 #include "tpm/fit/design/design.hpp"
 
 using namespace tpm;
-using namespace tpm::organ;
 using namespace tpm::fit;
 
 namespace {

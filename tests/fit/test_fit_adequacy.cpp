@@ -22,9 +22,6 @@
 #include "tpmkit/law_model.hpp"
 
 using namespace tpm;
-using namespace tpm::base;
-using namespace tpm::data;
-using namespace tpm::files;
 using namespace tpm::fit;
 using Catch::Contains;
 using Catch::EndsWith;
@@ -34,14 +31,18 @@ using test::Defect;
 
 namespace {
 
-Selection selected_linear_1(const PreparedRecording& recording) {
+Selection selected_law(const char* law, const PreparedRecording& recording, bool profiles = false) {
   SelectionOptions options;
-  options.laws = {parse_law_name("linear-1", "test")};
+  options.laws = {parse_law_name(law, "test")};
   options.only_listed = true;
   options.held_out = false;
   options.setup.starts = 4;
-  options.setup.profiles = false;
+  options.setup.profiles = profiles;
   return select_law(std::span(&recording, 1), options);
+}
+
+Selection selected_linear_1(const PreparedRecording& recording) {
+  return selected_law("linear-1", recording);
 }
 
 const FitResult& best_of(const Selection& s) {
@@ -369,13 +370,7 @@ TEST_CASE("a plateau that the hold does not reach is not identified", "[adequacy
     placed.rest_s = 20.0;
     placed.hold_s = 20.0;
     placed.noise_N = 1e-4;
-    const PreparedRecording recording = test::prepared(placed, 3);
-    SelectionOptions options;
-    options.laws = {parse_law_name("linear-1", "test")};
-    options.only_listed = true;
-    options.held_out = false;
-    options.setup.starts = 4;
-    const Selection s = select_law(std::span(&recording, 1), options);
+    const Selection s = selected_law("linear-1", test::prepared(placed, 3), true);
     for (const ParameterResult& p : best_of(s).parameters) {
       if (p.parameter.name == "k_inf") return verdict_text(p);
     }
@@ -398,14 +393,7 @@ TEST_CASE("an unloading with hysteresis contradicts a law without memory", "[ade
     placed.after_s = 1.0;
     placed.step_s = 0.02;
     placed.noise_N = 4e-4;
-    const PreparedRecording recording = test::prepared(placed, 5);
-    SelectionOptions options;
-    options.laws = {parse_law_name("power", "test")};
-    options.only_listed = true;
-    options.held_out = false;
-    options.setup.starts = 4;
-    options.setup.profiles = false;
-    return select_law(std::span(&recording, 1), options);
+    return selected_law("power", test::prepared(placed, 5));
   };
   const Selection relaxing = selected("power-1", {60.0, 45.0, 2.0, 1.5});
   CHECK_THAT(hysteresis_of(best_of(relaxing)), StartsWith("the unloading is off by "));
@@ -443,16 +431,7 @@ TEST_CASE("an unloading that a law with memory does not predict contradicts it",
     return prepare_recording("made.csv", test::measured(placed, std::move(clean), random));
   };
   SECTION("softening is no relaxation") {
-    const Selection s = [&] {
-      const PreparedRecording recording = triangle(65, 0.0, true);
-      SelectionOptions options;
-      options.laws = {parse_law_name("hertz-1", "test")};
-      options.only_listed = true;
-      options.held_out = false;
-      options.setup.starts = 4;
-      options.setup.profiles = false;
-      return select_law(std::span(&recording, 1), options);
-    }();
+    const Selection s = selected_law("hertz-1", triangle(65, 0.0, true));
     const LawAdequacy& adequacy = best_of(s).adequacy.value();
     CHECK(adequacy.is_rejected());
     REQUIRE_FALSE(adequacy.causes.empty());

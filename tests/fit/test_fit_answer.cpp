@@ -16,9 +16,6 @@
 #include "tpmkit/law_model.hpp"
 
 using namespace tpm;
-using namespace tpm::base;
-using namespace tpm::files;
-using namespace tpm::show;
 using namespace tpm::fit;
 using Catch::Matchers::Contains;
 
@@ -99,7 +96,7 @@ TEST_CASE("the short answer of a law with many parameters names the verdict of e
   for (int i = 0; i < 30; ++i) {
     ParameterResult more = one;
     more.parameter.name = fmt::format("more{}", i);
-    more.not_separable.clear();
+    more.not_separable.reset();
     more.verdict = i == 29 ? Verdict::flat : Verdict::identified;
     fit.parameters.push_back(more);
   }

@@ -9,7 +9,6 @@
 #include "tpm/fit/likelihood/fit_keys.hpp"
 
 using namespace tpm;
-using namespace tpm::files;
 using namespace tpm::fit;
 
 namespace {

@@ -9,7 +9,6 @@
 #include "tpm/fit/petab.hpp"
 
 using namespace tpm;
-using namespace tpm::files;
 using namespace tpm::fit;
 using Catch::Contains;
 using Catch::Matchers::WithinRel;

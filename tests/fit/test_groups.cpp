@@ -14,8 +14,6 @@
 #include "tpmkit/error.hpp"
 
 using namespace tpm;
-using namespace tpm::base;
-using namespace tpm::files;
 using namespace tpm::fit;
 using Catch::Matchers::Contains;
 using Catch::Matchers::WithinAbs;

@@ -19,7 +19,6 @@
 #include "tpmkit/law_model.hpp"
 
 using namespace tpm;
-using namespace tpm::base;
 using namespace tpm::fit;
 using Catch::Contains;
 using Catch::Matchers::WithinAbs;

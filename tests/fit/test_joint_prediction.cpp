@@ -9,9 +9,6 @@
 #include "joint_recordings.hpp"
 
 using namespace tpm;
-using namespace tpm::base;
-using namespace tpm::data;
-using namespace tpm::files;
 using namespace tpm::fit;
 
 TEST_CASE("a fitted recording is predicted as it was fitted", "[predict][joint]") {

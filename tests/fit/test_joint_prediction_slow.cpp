@@ -5,9 +5,6 @@
 #include "tpm/fit/select/selection.hpp"
 
 using namespace tpm;
-using namespace tpm::base;
-using namespace tpm::data;
-using namespace tpm::files;
 using namespace tpm::fit;
 
 TEST_CASE("every law predicts its own recordings as they were fitted", "[predict][joint][slow]") {

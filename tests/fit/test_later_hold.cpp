@@ -9,7 +9,6 @@
 #include "tpmkit/law_model.hpp"
 
 using namespace tpm;
-using namespace tpm::base;
 using namespace tpm::fit;
 using Catch::Contains;
 

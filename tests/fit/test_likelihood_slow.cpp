@@ -18,9 +18,6 @@
 #include "tpmkit/law_model.hpp"
 
 using namespace tpm;
-using namespace tpm::base;
-using namespace tpm::files;
-using namespace tpm::organ;
 using namespace tpm::fit;
 using Catch::Contains;
 using Catch::Matchers::WithinAbs;

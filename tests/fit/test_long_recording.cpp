@@ -9,9 +9,6 @@
 #include "tpm/fit/select/selection.hpp"
 
 using namespace tpm;
-using namespace tpm::base;
-using namespace tpm::files;
-using namespace tpm::organ;
 using namespace tpm::fit;
 using Catch::Matchers::Contains;
 using Catch::Matchers::WithinRel;

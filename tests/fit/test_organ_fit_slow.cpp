@@ -5,8 +5,6 @@
 #include "tpm/organ/scene/organ_model.hpp"
 
 using namespace tpm;
-using namespace tpm::files;
-using namespace tpm::organ;
 using namespace tpm::fit;
 using Catch::Matchers::WithinRel;
 

@@ -9,8 +9,6 @@
 #include "tpmkit/tpm_element.hpp"
 
 using namespace tpm;
-using namespace tpm::files;
-using namespace tpm::organ;
 using namespace tpm::fit;
 using Catch::Matchers::WithinRel;
 

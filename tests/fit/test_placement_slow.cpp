@@ -7,7 +7,6 @@
 #include "placement_studies.hpp"
 
 using namespace tpm;
-using namespace tpm::base;
 using namespace tpm::fit;
 using test::PlacedTest;
 

@@ -6,7 +6,6 @@
 #include "tpm/fit/design/recovery.hpp"
 
 using namespace tpm;
-using namespace tpm::organ;
 using namespace tpm::fit;
 
 namespace {

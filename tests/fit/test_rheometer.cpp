@@ -18,10 +18,6 @@
 #include "tpmkit/law_model.hpp"
 
 using namespace tpm;
-using namespace tpm::base;
-using namespace tpm::law;
-using namespace tpm::files;
-using namespace tpm::organ;
 using namespace tpm::fit;
 using Catch::Matchers::Contains;
 using Catch::Matchers::StartsWith;

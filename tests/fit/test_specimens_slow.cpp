@@ -11,8 +11,6 @@
 #include "tpmkit/law_model.hpp"
 
 using namespace tpm;
-using namespace tpm::base;
-using namespace tpm::organ;
 using namespace tpm::fit;
 
 namespace {

@@ -7,7 +7,6 @@
 #include "tpm/fit/select/selection.hpp"
 
 using namespace tpm;
-using namespace tpm::base;
 using namespace tpm::fit;
 using Catch::Matchers::Contains;
 using tpm::test::CreepTrial;

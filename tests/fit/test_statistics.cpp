@@ -18,9 +18,6 @@
 #include "tpmkit/error.hpp"
 
 using namespace tpm;
-using namespace tpm::base;
-using namespace tpm::files;
-using namespace tpm::organ;
 using namespace tpm::fit;
 using namespace tpm::test;
 using Catch::Matchers::Contains;

@@ -9,8 +9,6 @@
 #include "tpm/fit/likelihood/correlation.hpp"
 
 using namespace tpm;
-using namespace tpm::base;
-using namespace tpm::organ;
 using namespace tpm::fit;
 using namespace tpm::test;
 using Catch::Matchers::WithinRel;

@@ -19,7 +19,6 @@
 #include "tpm/files/json.hpp"
 
 using namespace tpm;
-using namespace tpm::base;
 using namespace tpm::files;
 using Catch::Contains;
 using Catch::Matchers::WithinAbs;

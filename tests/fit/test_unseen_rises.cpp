@@ -8,7 +8,6 @@
 #include "tpm/fit/select/unseen_rises.hpp"
 
 using namespace tpm;
-using namespace tpm::base;
 using namespace tpm::fit;
 using Catch::Matchers::Contains;
 using Catch::Matchers::WithinAbs;

@@ -1,5 +1,7 @@
 // tpm validate of presses by a hand: slow, late, with pauses, tremor, overshoot or a slip. The
 // whole press is compared, or it is said which part is.
+#include <fmt/format.h>
+
 #include <catch2/catch.hpp>
 #include <cmath>
 #include <numbers>
@@ -135,6 +137,23 @@ TEST_CASE("a hand that leaves is compared as long as it held, which is said", "[
 
 TEST_CASE("a hand that was never there is refused", "[validate][hand]") {
   CHECK_THROWS_WITH(compared({hand_press([](double) { return 0.0; })}), Contains("never rises"));
+}
+
+TEST_CASE("presses of one session are named without its file, whatever that is called",
+          "[validate][hand]") {
+  ValidationRequest request;
+  request.law_file = "law.json";
+  request.law = hand_law();
+  request.quantities = {{QuantityKind::peak}};
+  for (const char* name : {"slow: 1", "slow: 2"}) {
+    PreparedRecording press = hand_press(kWhole[0].part);
+    press.name = fmt::format("Monday: a.tpmrec: {}", name);
+    request.recordings.push_back(std::move(press));
+    request.presses.push_back({{}, kAskedHold_s, "Monday: a.tpmrec", name});
+  }
+  const Validation v = validate(request);
+  CHECK_THAT(to_terminal_text(v), Contains("with Monday: a.tpmrec: slow: 1, slow: 2,"));
+  CHECK(to_json(v)["recordings"][1]["recording"] == "Monday: a.tpmrec: slow: 2");
 }
 
 TEST_CASE("several presses are compared as wholes, each", "[validate][hand]") {

@@ -5,7 +5,6 @@
 #include "placed_recordings.hpp"
 
 using namespace tpm;
-using namespace tpm::base;
 using namespace tpm::fit;
 using test::PlacedTest;
 

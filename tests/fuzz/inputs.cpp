@@ -36,10 +36,6 @@
 #include "tpmkit/units.hpp"
 
 namespace tpm::fuzz {
-using namespace files;
-using namespace organ;
-using namespace plan;
-using namespace fit;
 using namespace haptics;
 using namespace sweep;
 using namespace paper;

@@ -3,7 +3,6 @@
 
 #include <catch2/catch.hpp>
 #include <chrono>
-#include <cstdlib>
 #include <fstream>
 #include <iterator>
 #include <memory>
@@ -18,6 +17,7 @@
 #include "tpm/haptics/session/jitter_check.hpp"
 #include "tpm/haptics/show/hil_report.hpp"
 #include "tpmkit/session.hpp"
+#include "vendor_script.hpp"
 
 namespace tpm::haptics {
 namespace {
@@ -25,42 +25,24 @@ namespace {
 using Catch::Matchers::Contains;
 
 /// The stand-in library with a script, for as long as this lives.
-class CheckedStandIn {
+class CheckedStandIn : public test::VendorScript {
  public:
-  explicit CheckedStandIn(const std::string& lines) {
-    write_file(folder_ / "script",
-               "watchdog_by_clock 0\nevents " + (folder_ / "events") + "\n" + lines);
-    (void)setenv("TPM_STAND_IN_SCRIPT", (folder_ / "script").c_str(), 1);
-  }
-  ~CheckedStandIn() { (void)unsetenv("TPM_STAND_IN_SCRIPT"); }
-  CheckedStandIn(const CheckedStandIn&) = delete;
-  CheckedStandIn& operator=(const CheckedStandIn&) = delete;
+  explicit CheckedStandIn(const std::string& lines)
+      : VendorScript("watchdog_by_clock 0\n" + lines) {}
 
-  [[nodiscard]] bool happened(const std::string& event) const {
-    return ("\n" + read_file(folder_ / "events")).find("\n" + event + " ") != std::string::npos;
-  }
   /// Its device, with a file in which one key is another.
   [[nodiscard]] DeviceChoice with_file(const char* key, const Json& value) const {
-    DeviceChoice device;
-    device.kind = "omega7";
-    device.library = TPM_STAND_IN_DHD;
-    device.file = folder_ / "device.json";
-    Json file = read_json(TPM_TEST_SOURCE_DIR "/tests/fixtures/stand_in_device.json");
-    file[key] = value;
-    write_file(device.file, to_text(file));
+    DeviceChoice device = test::stand_in_choice();
+    Json changed = read_json(device.file);
+    changed[key] = value;
+    device.file = file("device.json");
+    write_file(device.file, to_text(changed));
     return device;
   }
-  [[nodiscard]] std::string file(const char* name) const { return folder_ / name; }
-
- private:
-  test::TempFolder folder_;
 };
 
 DeviceChoice device_without_a_file() {
-  DeviceChoice device;
-  device.kind = "omega7";
-  device.library = TPM_STAND_IN_DHD;
-  return device;
+  return test::stand_in_choice("");
 }
 
 /// Exit code of `tpm hil check`, its answer and its message.

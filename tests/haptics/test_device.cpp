@@ -194,7 +194,7 @@ TEST_CASE("A hand that wants a place beyond the stop does not push harder and ha
   OperatorPiece far{OperatorPiece::Aim::place, kLong_s, kWanted_m, kWanted_m};
   OperatorPiece back{OperatorPiece::Aim::place, 1.0, 0.0, 0.0};
   VirtualOmega7 device(s, OperatorScript({far, back}));
-  CHECK_THAT(device.open().assumptions.back(),
+  CHECK_THAT(device.open().assumptions.back().text,
              Catch::Contains("0.16 m diameter and 0.11 m length"));
   device.prepare({});
   device.enable_forces();
@@ -216,7 +216,7 @@ TEST_CASE("A simulated watchdog can be told to forgive, and names that among its
   PlantSettings s = bare();
   s.least_watchdog_s = 0.01;
   VirtualOmega7 device(s, still());
-  CHECK_THAT(device.open().assumptions.back(), Catch::Contains("watchdog"));
+  CHECK(device.open().assumptions.back().code == "least_watchdog");
   DevicePreparation preparation;
   preparation.watchdog_s = 0.004;
   device.prepare(preparation);

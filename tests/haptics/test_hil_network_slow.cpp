@@ -210,11 +210,5 @@ TEST_CASE("The report of a session says how it ended and where it left the range
              Contains("beyond the range that the model is good for in 2 cycles, first at 0.5 s"));
 }
 
-TEST_CASE("The model that was deleted is refused by name, with what replaces it") {
-  CHECK_THROWS_WITH(test::parsed(test::network_session("network_beside")),
-                    Contains("/model/kind") && Contains("'network_beside' was removed") &&
-                        Contains("expected planned") && Contains("network"));
-}
-
 }  // namespace
 }  // namespace tpm::haptics

@@ -41,7 +41,7 @@ TEST_CASE("A service is opened in both formats, made neutral, and what it says i
     CHECK_FALSE(identity.hardware);  // it says SIMULATED DEVICE
     CHECK_THAT(identity.library_version, Contains(old ? "values" : "vector"));
     std::string all;
-    for (const std::string& line : identity.assumptions) all += line + "\n";
+    for (const Remark& line : identity.assumptions) all += line.text + "\n";
     CHECK_THAT(all, Contains("force gate 0") && Contains("preset 'arm_front_centered'") &&
                         Contains("at most 4 N (assumed: ") &&
                         Contains("80 mm from the middle of the workspace (assumed: "));

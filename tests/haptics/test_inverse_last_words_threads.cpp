@@ -12,6 +12,7 @@
 #include <vector>
 
 #include "inverse_sessions.hpp"
+#include "tpm/base/remark.hpp"
 #include "tpm/haptics/loop/empty_space.hpp"
 #include "tpm/haptics/loop/servo_step.hpp"
 #include "tpm/haptics/session/jitter_check.hpp"
@@ -241,7 +242,7 @@ TEST_CASE("Torque scaling and a mount that is moved are set neutral or refused")
     }
     StandInInverse service(PlantSettings{}, {}, false, f);
     InverseDevice device(address_of_talker(service), limits_of("inverse3"));
-    CHECK_THAT(fmt::format("{}", fmt::join(device.open().assumptions, "\n")),
+    CHECK_THAT(fmt::format("{}", fmt::join(base::remark_texts(device.open().assumptions), "\n")),
                Contains("mount at 0 0 0 m") && Contains("torque scaling off"));
     CHECK(service.settings().torque_scaling == false);
     f.keeps = {setting};

@@ -9,6 +9,7 @@
 
 #include "inverse_sessions.hpp"
 #include "temp_folder.hpp"
+#include "tpm/base/remark.hpp"
 #include "tpm/haptics/session/recording.hpp"
 
 namespace tpm::haptics {
@@ -27,7 +28,7 @@ TEST_CASE("What no message sets is set over HTTP, read back and recorded") {
     StandInInverse service(PlantSettings{}, {}, false, f);
     const InverseAddress address{service.port(), service.events_port(), service.port(), ""};
     InverseDevice device(address, limits_of("inverse3"));
-    const std::vector<std::string> lines = device.open().assumptions;
+    const std::vector<std::string> lines = base::remark_texts(device.open().assumptions);
     CHECK(service.settings().carried() == 1.0);
     CHECK_THAT(fmt::format("{}", fmt::join(lines, "\n")),
                Contains("gravity compensation on, factor 1"));
@@ -35,7 +36,7 @@ TEST_CASE("What no message sets is set over HTTP, read back and recorded") {
     InverseAddress half = address;
     half.gravity_carried = 0.5;
     InverseDevice again(half, limits_of("inverse3"));
-    CHECK_THAT(fmt::format("{}", fmt::join(again.open().assumptions, "\n")),
+    CHECK_THAT(fmt::format("{}", fmt::join(base::remark_texts(again.open().assumptions), "\n")),
                Contains("gravity compensation on, factor 0.5"));
     InverseAddress none = address;
     none.gravity_carried = 0.0;

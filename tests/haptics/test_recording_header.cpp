@@ -58,7 +58,7 @@ Json whole_header(const Json& of = test::short_session()) {
   DeviceIdentity device;
   device.kind = "virtual";
   device.name = "simulated Omega.7";
-  device.assumptions = {"moving mass 0.3 kg"};
+  device.assumptions = {{"moving_mass", "moving mass 0.3 kg"}};
   return recording_header(session, device, model, false, {"2020-01-01", "a", "b"}, rendering);
 }
 
@@ -193,6 +193,12 @@ TEST_CASE("remarks of a rendering are read with their codes, and those of earlie
   header["rendering"]["warnings"] = Json::array({"something"});
   CHECK(read().remarks.empty());
   CHECK(read().texts() == std::vector<std::string>{"something"});
+  const auto assumed = [&] {
+    return recording_header_block().read(header, place).device.assumptions;
+  };
+  CHECK(assumed() == std::vector<Remark>{{"moving_mass", "moving mass 0.3 kg"}});
+  header["device"]["assumptions"] = Json::array({"moving mass 0.3 kg"});
+  CHECK(assumed() == std::vector<Remark>{{"uncoded", "moving mass 0.3 kg"}});
 }
 
 TEST_CASE("a whole recording is read, its header that of the writer") {

@@ -6,7 +6,6 @@
 #include <catch2/catch.hpp>
 #include <chrono>
 #include <csignal>
-#include <cstdlib>
 #include <filesystem>
 #include <fstream>
 #include <thread>
@@ -22,6 +21,7 @@
 #include "tpm/haptics/session/session_run.hpp"
 #include "tpm/haptics/verify/verify.hpp"
 #include "tpmkit/error.hpp"
+#include "vendor_script.hpp"
 
 namespace tpm::haptics {
 namespace {
@@ -98,25 +98,10 @@ TEST_CASE("A session on the clock that is interrupted stops safely and is whole"
   CHECK(read_recording(folder / "r").closed);
 }
 
-long long event_ns(const std::string& file, const std::string& event) {
-  std::ifstream events(file);
-  std::string name;
-  long long time = 0;
-  while (events >> name >> time) {
-    if (name == event) return time;
-  }
-  return -1;
-}
-
 TEST_CASE("A device that is not the one of its file gets no force, not even for the check before") {
   const test::TempFolder folder;
-  const std::string events = folder / "events";
-  write_file(folder / "script", hand_in_place(folder) + "events " + events + "\n");
-  (void)setenv("TPM_STAND_IN_SCRIPT", (folder / "script").c_str(), 1);
-  DeviceChoice device;
-  device.kind = "omega7";
-  device.library = TPM_STAND_IN_DHD;
-  device.file = folder / "device.json";
+  const test::VendorScript script(hand_in_place(folder));
+  const DeviceChoice device = test::stand_in_choice(folder / "device.json");
   Json file = read_json(TPM_TEST_SOURCE_DIR "/tests/fixtures/stand_in_device.json");
   file["serial"] = "1";
   write_file(device.file, to_text(file));
@@ -124,28 +109,20 @@ TEST_CASE("A device that is not the one of its file gets no force, not even for 
   options.check_delay = true;
   CHECK_THROWS_WITH(run_session(patient_session(), device, options),
                     Catch::Contains("was measured on the device '1', and this is '4711'"));
-  (void)unsetenv("TPM_STAND_IN_SCRIPT");
-  CHECK(event_ns(events, "open") > 0);
-  CHECK(event_ns(events, "close") > 0);
-  CHECK(event_ns(events, "thread_of_forces_on") == -1);
+  CHECK(script.event_ns("open") > 0);
+  CHECK(script.event_ns("close") > 0);
+  CHECK(script.event_ns("thread_of_forces_on") == -1);
 }
 
 TEST_CASE("A device with motors is not driven in virtual time") {
   const test::TempFolder folder;
-  const std::string events = folder / "events";
-  write_file(folder / "script", hand_in_place(folder) + "clock 1\nevents " + events + "\n");
-  (void)setenv("TPM_STAND_IN_SCRIPT", (folder / "script").c_str(), 1);
-  DeviceChoice device;
-  device.kind = "omega7";
-  device.library = TPM_STAND_IN_DHD;
-  device.file = TPM_TEST_SOURCE_DIR "/tests/fixtures/stand_in_device.json";
+  const test::VendorScript script(hand_in_place(folder) + "clock 1\n");
   SessionRunOptions options;
   options.recording = folder / "r";
-  CHECK_THROWS_WITH(run_session(patient_session(), device, options),
+  CHECK_THROWS_WITH(run_session(patient_session(), test::stand_in_choice(), options),
                     Catch::Contains("a device with motors keeps the clock; expected --clock real"));
-  (void)unsetenv("TPM_STAND_IN_SCRIPT");
-  CHECK(event_ns(events, "close") > 0);
-  CHECK(event_ns(events, "thread_of_forces_on") == -1);
+  CHECK(script.event_ns("close") > 0);
+  CHECK(script.event_ns("thread_of_forces_on") == -1);
   CHECK_FALSE(std::filesystem::exists(folder / "r"));
 }
 
@@ -153,31 +130,24 @@ TEST_CASE("A call that hangs: forces are off before it ends, the cause is told")
   bool seen = false;
   for (int attempt = 0; attempt < 10 && !seen; ++attempt) {
     const test::TempFolder folder;
-    const std::string events = folder / "events";
-    write_file(folder / "script",
-               hand_in_place(folder) + "events " + events + "\nfault hang 350 2000\n");
-    (void)setenv("TPM_STAND_IN_SCRIPT", (folder / "script").c_str(), 1);
+    const test::VendorScript script(hand_in_place(folder) + "fault hang 350 2000\n");
     HilSession session = patient_session();
     session.cycle_timeout_s = 0.006;
-    DeviceChoice device;
-    device.kind = "omega7";
-    device.library = TPM_STAND_IN_DHD;
-    device.file = TPM_TEST_SOURCE_DIR "/tests/fixtures/stand_in_device.json";
-    const SessionRun run = run_session(session, device, on_the_clock(folder / "r"));
-    (void)unsetenv("TPM_STAND_IN_SCRIPT");
+    const SessionRun run =
+        run_session(session, test::stand_in_choice(), on_the_clock(folder / "r"));
     if (run.outcome.cause == StopCause::watchdog) continue;  // the machine was stalled
     REQUIRE(run.outcome.cause == StopCause::cycle_timeout);
     const HilRecording recording = read_recording(folder / "r");
     CHECK(recording.closed);
     CHECK(recording.closing.at("cause") == "cycle timeout");
-    const long long hung = event_ns(events, "hang"), off = event_ns(events, "forces_off");
+    const long long hung = script.event_ns("hang"), off = script.event_ns("forces_off");
     if (hung > 0 && off > hung) {  // else the machine itself hung before
       seen = true;
       CHECK(1e-9 * static_cast<double>(off - hung) < 2.0);  // the call itself takes as long
       CHECK(recording.rows.size() >= 90);                   // nothing before it is lost
     }
     // The stuck thread ends before its library gets another script.
-    for (int wait = 0; wait < 100 && hung > 0 && event_ns(events, "hang_over") < 0; ++wait) {
+    for (int wait = 0; wait < 100 && hung > 0 && script.event_ns("hang_over") < 0; ++wait) {
       std::this_thread::sleep_for(50ms);
     }
     std::this_thread::sleep_for(300ms);
@@ -186,15 +156,8 @@ TEST_CASE("A call that hangs: forces are off before it ends, the cause is told")
 }
 
 /// A session on the stand-in, interrupted soon.
-SessionRun short_run_on_stand_in(const test::TempFolder& folder, const std::string& lines,
+SessionRun short_run_on_stand_in(const test::TempFolder& folder,
                                  std::atomic<int>* cycles = nullptr) {
-  write_file(folder / "script",
-             hand_in_place(folder) + lines + "events " + (folder / "events") + "\n");
-  (void)setenv("TPM_STAND_IN_SCRIPT", (folder / "script").c_str(), 1);
-  DeviceChoice device;
-  device.kind = "omega7";
-  device.library = TPM_STAND_IN_DHD;
-  device.file = TPM_TEST_SOURCE_DIR "/tests/fixtures/stand_in_device.json";
   SessionRunOptions options = on_the_clock(folder / "r");
   const auto start = std::chrono::steady_clock::now();
   options.interrupted = [start] { return std::chrono::steady_clock::now() - start > 300ms; };
@@ -203,20 +166,18 @@ SessionRun short_run_on_stand_in(const test::TempFolder& folder, const std::stri
       if (row.stop == StopCause::none) ++*cycles;
     };
   }
-  SessionRun run = run_session(patient_session(), device, options);
-  (void)unsetenv("TPM_STAND_IN_SCRIPT");
-  return run;
+  return run_session(patient_session(), test::stand_in_choice(), options);
 }
 
 TEST_CASE(
     "The device is prepared when all threads are there, and the loop's thread enables forces") {
   const test::TempFolder folder;
-  (void)short_run_on_stand_in(folder, "watchdog_by_clock 0\n");
-  const std::string events = folder / "events";
+  const test::VendorScript script(hand_in_place(folder) + "watchdog_by_clock 0\n");
+  (void)short_run_on_stand_in(folder);
   // The caller's, the loop's and that of the records.
-  CHECK(event_ns(events, "threads_when_prepared") >= 3);
-  CHECK(event_ns(events, "thread_of_forces_on") > 0);
-  CHECK(event_ns(events, "thread_of_forces_on") == event_ns(events, "thread_of_first_read"));
+  CHECK(script.event_ns("threads_when_prepared") >= 3);
+  CHECK(script.event_ns("thread_of_forces_on") > 0);
+  CHECK(script.event_ns("thread_of_forces_on") == script.event_ns("thread_of_first_read"));
 }
 
 TEST_CASE("A device whose watchdog counts by the clock lets a session begin") {
@@ -226,8 +187,9 @@ TEST_CASE("A device whose watchdog counts by the clock lets a session begin") {
   std::atomic<int> cycles{0};
   for (int attempt = 0; attempt < 10 && cycles < kSome; ++attempt) {
     const test::TempFolder folder;
+    const test::VendorScript script(hand_in_place(folder));
     cycles = 0;
-    (void)short_run_on_stand_in(folder, "", &cycles);
+    (void)short_run_on_stand_in(folder, &cycles);
   }
   CHECK(cycles >= kSome);
 }
@@ -253,20 +215,14 @@ TEST_CASE("In real time the watchdog of the simulated device counts by the clock
 TEST_CASE(
     "A stall stands in the record with its whole length, and agrees with the missed periods") {
   const test::TempFolder folder;
-  write_file(folder / "script", hand_in_place(folder) + "watchdog_by_clock 0\nevents " +
-                                    (folder / "events") + "\nfault hang 350 30\n");
-  (void)setenv("TPM_STAND_IN_SCRIPT", (folder / "script").c_str(), 1);
+  const test::VendorScript script(hand_in_place(folder) +
+                                  "watchdog_by_clock 0\nfault hang 350 30\n");
   HilSession session = patient_session();
   session.cycle_timeout_s = 1.0;
-  DeviceChoice device;
-  device.kind = "omega7";
-  device.library = TPM_STAND_IN_DHD;
-  device.file = TPM_TEST_SOURCE_DIR "/tests/fixtures/stand_in_device.json";
   SessionRunOptions options = on_the_clock(folder / "r");
   const auto start = std::chrono::steady_clock::now();
   options.interrupted = [start] { return std::chrono::steady_clock::now() - start > 1500ms; };
-  (void)run_session(session, device, options);
-  (void)unsetenv("TPM_STAND_IN_SCRIPT");
+  (void)run_session(session, test::stand_in_choice(), options);
   const HilRecording recording = read_recording(folder / "r");
   const double period_s = session.servo.period_s;
   double longest_s = 0.0;
@@ -281,18 +237,11 @@ TEST_CASE(
 
 TEST_CASE("Slow calls of the device end in a safe stop with the overrun storm as its cause") {
   const test::TempFolder folder;
-  const std::string events = folder / "events";
-  write_file(folder / "script", hand_in_place(folder) + "watchdog_by_clock 0\nevents " + events +
-                                    "\nfault slow 350 100000\n");
-  (void)setenv("TPM_STAND_IN_SCRIPT", (folder / "script").c_str(), 1);
+  const test::VendorScript script(hand_in_place(folder) +
+                                  "watchdog_by_clock 0\nfault slow 350 100000\n");
   HilSession session = patient_session();
   session.servo.most_late = 20;
-  DeviceChoice device;
-  device.kind = "omega7";
-  device.library = TPM_STAND_IN_DHD;
-  device.file = TPM_TEST_SOURCE_DIR "/tests/fixtures/stand_in_device.json";
-  const SessionRun run = run_session(session, device, on_the_clock(folder / "r"));
-  (void)unsetenv("TPM_STAND_IN_SCRIPT");
+  const SessionRun run = run_session(session, test::stand_in_choice(), on_the_clock(folder / "r"));
   REQUIRE(run.outcome.cause == StopCause::overrun_storm);
   const HilRecording recording = read_recording(folder / "r");
   CHECK(recording.closing.at("cause") == to_string(StopCause::overrun_storm));
@@ -304,7 +253,7 @@ TEST_CASE("Slow calls of the device end in a safe stop with the overrun storm as
   const auto seen = std::count_if(recording.rows.begin(), recording.rows.end(), late);
   CHECK(seen >= 1);
   CHECK(seen <= 21);
-  CHECK(event_ns(events, "forces_off") > 0);
+  CHECK(script.event_ns("forces_off") > 0);
 }
 
 TEST_CASE("Whatever throws while a session runs, its threads end and the forces are off") {
@@ -373,7 +322,7 @@ TEST_CASE("The jitter check counts and reports") {
   HilSession session;
   session.servo.period_s = 2e-3;
   const JitterCheck check = check_jitter(device, session, 0.5, RealTimeWish::ignore);
-  CHECK_THAT(check.device.assumptions.back(),
+  CHECK_THAT(check.device.assumptions.back().text,
              Catch::Contains("a watchdog that waits 1 s at least"));
   CHECK(check.watchdog_s == session.preparation.watchdog_s);
   CHECK(check.outcome.woke_late.count() > 0);
@@ -388,7 +337,8 @@ TEST_CASE("A machine that stalls does not end an identification by the simulated
   options.real_time = true;
   const IdentifyRun run = run_identification(DeviceChoice{}, session, options);
   CHECK(run.outcome.cause != StopCause::watchdog);
-  CHECK_THAT(run.device.assumptions.back(), Catch::Contains("a watchdog that waits 1 s at least"));
+  CHECK_THAT(run.device.assumptions.back().text,
+             Catch::Contains("a watchdog that waits 1 s at least"));
 }
 
 TEST_CASE("Quantiles of times are the upper edges of their bins, and beyond the bins the largest") {

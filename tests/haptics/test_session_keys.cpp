@@ -6,7 +6,6 @@
 #include "tpm/haptics/session/session_keys.hpp"
 
 using namespace tpm;
-using namespace tpm::files;
 using namespace tpm::haptics;
 
 namespace {

@@ -60,6 +60,7 @@ TEST_CASE("A session's presses are those that it asked for, each with what came 
   for (std::size_t i = 0; i < 2; ++i) {
     const Recording& r = presses[i].recording.recording;
     CHECK(r.header.sha256 == "abc");
+    CHECK(r.header.id == presses[i].motion.session + ": " + presses[i].motion.press);
     CHECK(r.time_s.size() >= 2000);
     const std::vector<Knot>& knots = presses[i].motion.knots;
     CHECK(knots.front().time_s == 0.0);

@@ -37,8 +37,10 @@ TEST_CASE("Of several devices one is chosen by its kind, its serial number or it
   const DeviceIdentity delta = opened("delta3", {});
   CHECK(delta.kind == "delta3");
   REQUIRE(delta.assumptions.size() == 7);  // and where each of six limits comes from
-  CHECK_THAT(delta.assumptions.front(), Contains("never tried with delta.3"));
-  CHECK_THAT(delta.assumptions[1], Contains("force_N: assumed: that of the Omega.7"));
+  CHECK(delta.assumptions.front().code == "never_tried");
+  CHECK_THAT(delta.assumptions.front().text, Contains("never tried with delta.3"));
+  CHECK(delta.assumptions[1].code == "limit_source");
+  CHECK_THAT(delta.assumptions[1].text, Contains("force_N: assumed: that of the Omega.7"));
   CHECK_THAT(test::vendor_message_of([&] { (void)opened("omega7", {}); }),
              Contains("2 devices are 'omega.7'") && Contains("serial 4713") &&
                  Contains("--serial NUMBER"));

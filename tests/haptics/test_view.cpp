@@ -18,9 +18,6 @@
 #include "tpm/plan/show/simulation_report.hpp"
 
 using namespace tpm;
-using namespace tpm::files;
-using namespace tpm::show;
-using namespace tpm::organ;
 using namespace tpm::haptics;
 using Catch::Matchers::Contains;
 using test::TempFolder;

@@ -16,8 +16,6 @@
 #include "tpm/law/relaxation/mittag_leffler.hpp"
 
 using namespace tpm;
-using namespace tpm::base;
-using namespace tpm::law;
 using namespace tpm::files;
 using Catch::Matchers::WithinAbs;
 using Catch::Matchers::WithinRel;

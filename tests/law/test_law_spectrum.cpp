@@ -14,8 +14,6 @@
 #include "tpmkit/tpm_element.hpp"
 
 using namespace tpm;
-using namespace tpm::base;
-using namespace tpm::law;
 using namespace tpm::files;
 using Catch::Matchers::WithinAbs;
 using Catch::Matchers::WithinRel;

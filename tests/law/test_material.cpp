@@ -19,9 +19,6 @@
 #include "written_out_scene.hpp"
 
 using namespace tpm;
-using namespace tpm::base;
-using namespace tpm::law;
-using namespace tpm::files;
 using namespace tpm::organ;
 using namespace tpm_test;
 using Catch::Matchers::WithinAbs;

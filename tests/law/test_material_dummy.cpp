@@ -10,8 +10,6 @@
 #include "tpm/organ/scene/organ_model.hpp"
 
 using namespace tpm;
-using namespace tpm::base;
-using namespace tpm::files;
 using namespace tpm::organ;
 using Catch::Matchers::WithinRel;
 using test::answer_of;

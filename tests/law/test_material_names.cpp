@@ -12,10 +12,6 @@
 #include "tpm/sweep/sweep_keys.hpp"
 
 using namespace tpm;
-using namespace tpm::base;
-using namespace tpm::files;
-using namespace tpm::organ;
-using namespace tpm::fit;
 using namespace tpm::sweep;
 using Catch::Matchers::WithinAbs;
 using Catch::Matchers::WithinRel;

@@ -15,10 +15,6 @@
 #include "tpmkit/law_model.hpp"
 
 using namespace tpm;
-using namespace tpm::base;
-using namespace tpm::files;
-using namespace tpm::show;
-using namespace tpm::organ;
 using namespace tpm::fit;
 using Catch::Matchers::WithinAbs;
 using Catch::Matchers::WithinRel;

@@ -20,7 +20,6 @@
 #include "tpmkit/protocol.hpp"
 
 using namespace tpm;
-using namespace tpm::law;
 using namespace tpm::files;
 using Catch::Matchers::WithinAbs;
 using Catch::Matchers::WithinRel;

@@ -16,8 +16,6 @@
 namespace {
 
 using namespace tpm;
-using namespace tpm::base;
-using namespace tpm::files;
 using namespace tpm::show;
 using test::AdequacyOutcome;
 using test::AdequacyTrial;

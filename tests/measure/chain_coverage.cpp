@@ -11,7 +11,6 @@
 namespace {
 
 using namespace tpm;
-using namespace tpm::organ;
 using namespace tpm::fit;
 
 void predict(int simulations, std::uint64_t seed) {

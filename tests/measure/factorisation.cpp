@@ -58,7 +58,6 @@ class StiffnessBlocks {
 #endif
 
 using namespace tpm;
-using namespace tpm::base;
 using namespace tpm::organ;
 
 namespace {

@@ -28,8 +28,6 @@
 #include "tpmkit/tpm_element.hpp"
 
 using namespace tpm;
-using namespace tpm::base;
-using namespace tpm::files;
 using namespace tpm::show;
 using namespace tpm::organ;
 

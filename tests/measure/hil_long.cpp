@@ -19,9 +19,6 @@
 #include "tpmkit/error.hpp"
 
 using namespace tpm;
-using namespace tpm::files;
-using namespace tpm::organ;
-using namespace tpm::contact;
 using namespace tpm::haptics;
 
 namespace {

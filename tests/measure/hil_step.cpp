@@ -18,7 +18,6 @@
 #include "tpm/haptics/session/session_run.hpp"
 
 using namespace tpm;
-using namespace tpm::files;
 using namespace tpm::haptics;
 
 namespace {

@@ -15,9 +15,6 @@
 #include "written_out_network.hpp"
 
 using namespace tpm;
-using namespace tpm::base;
-using namespace tpm::law;
-using namespace tpm::organ;
 using namespace tpm::contact;
 using namespace tpm_test;
 using tpm::testing::OrganScene;

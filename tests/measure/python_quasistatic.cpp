@@ -11,7 +11,6 @@
 #include "tpmkit/tpm_element.hpp"
 
 using namespace tpm;
-using namespace tpm::files;
 using namespace tpm::organ;
 
 namespace {

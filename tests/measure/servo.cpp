@@ -17,8 +17,6 @@
 #include "tpmkit/error.hpp"
 
 using namespace tpm;
-using namespace tpm::organ;
-using namespace tpm::contact;
 using namespace tpm::accuracy;
 
 namespace {

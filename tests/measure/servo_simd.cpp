@@ -22,7 +22,6 @@
 #include "tpm/organ/scene/scene.hpp"
 
 using namespace tpm;
-using namespace tpm::organ;
 using namespace tpm::contact;
 
 namespace {

@@ -14,7 +14,6 @@
 #include "tpm/haptics/session/surface_scene.hpp"
 
 using namespace tpm;
-using namespace tpm::organ;
 using namespace tpm::haptics;
 
 namespace {

@@ -20,7 +20,6 @@
 #include "tpm/organ/linear/block_ldlt.hpp"
 
 using namespace tpm;
-using namespace tpm::files;
 using namespace tpm::organ;
 
 namespace {

@@ -19,9 +19,6 @@
 #include "tpm/haptics/session/surface_scene.hpp"
 
 using namespace tpm;
-using namespace tpm::base;
-using namespace tpm::organ;
-using namespace tpm::contact;
 using namespace tpm::haptics;
 
 namespace {

@@ -11,7 +11,6 @@
 #include "tpmkit/error.hpp"
 
 using namespace tpm;
-using namespace tpm::files;
 using namespace tpm::organ;
 using Catch::Matchers::Contains;
 using Catch::Matchers::WithinAbs;

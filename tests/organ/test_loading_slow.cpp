@@ -10,7 +10,6 @@
 #include "tpm/organ/scene/network_file.hpp"
 
 using namespace tpm;
-using namespace tpm::files;
 using namespace tpm::organ;
 using Catch::Matchers::WithinAbs;
 using tpm_test::python_reference;

@@ -16,7 +16,6 @@
 #include "tpmkit/tpm_element.hpp"
 
 using namespace tpm;
-using namespace tpm::base;
 using namespace tpm::organ;
 using namespace tpm_test;
 using Catch::Matchers::WithinAbs;

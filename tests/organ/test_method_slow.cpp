@@ -9,8 +9,6 @@
 #include "tpmkit/tpm_element.hpp"
 
 using namespace tpm;
-using namespace tpm::law;
-using namespace tpm::organ;
 using namespace tpm::accuracy;
 using namespace tpm_test;
 using Catch::Matchers::WithinAbs;

@@ -9,7 +9,6 @@
 #include "tpmkit/tpm_element.hpp"
 
 using namespace tpm;
-using namespace tpm::base;
 using namespace tpm::organ;
 using Catch::Matchers::WithinAbs;
 using Catch::Matchers::WithinRel;

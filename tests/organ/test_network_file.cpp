@@ -12,9 +12,7 @@
 #include "tpm/organ/scene/network_file.hpp"
 
 using namespace tpm;
-using namespace tpm::base;
 using namespace tpm::organ;
-using namespace tpm::files;
 using namespace tpm::test;
 using Catch::Matchers::WithinAbs;
 

@@ -17,7 +17,6 @@
 #include "tpmkit/error.hpp"
 
 using namespace tpm;
-using namespace tpm::base;
 using namespace tpm::organ;
 using namespace tpm::test;
 using Catch::Matchers::Contains;

@@ -6,7 +6,6 @@
 #include "tpm/organ/scene/refilled_scene.hpp"
 
 using namespace tpm;
-using namespace tpm::files;
 using namespace tpm::organ;
 using Catch::Matchers::Contains;
 using Catch::Matchers::WithinAbs;

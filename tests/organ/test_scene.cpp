@@ -14,8 +14,6 @@
 #include "tpmkit/tpm_element.hpp"
 
 using namespace tpm;
-using namespace tpm::base;
-using namespace tpm::files;
 using namespace tpm::organ;
 using Catch::Matchers::Contains;
 using Catch::Matchers::StartsWith;

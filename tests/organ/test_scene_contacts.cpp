@@ -10,8 +10,6 @@
 #include "tpmkit/error.hpp"
 
 using namespace tpm;
-using namespace tpm::work;
-using namespace tpm::files;
 using namespace tpm::organ;
 using Catch::Matchers::WithinAbs;
 using Catch::Matchers::WithinRel;

@@ -13,7 +13,6 @@
 #include "tpm/organ/scene/scene_keys.hpp"
 
 using namespace tpm;
-using namespace tpm::files;
 using namespace tpm::organ;
 using Catch::Matchers::Contains;
 using Catch::Matchers::EndsWith;

@@ -18,9 +18,6 @@
 #include "tpmkit/error.hpp"
 
 using namespace tpm;
-using namespace tpm::work;
-using namespace tpm::law;
-using namespace tpm::files;
 using namespace tpm::organ;
 using Catch::Matchers::Contains;
 using Catch::Matchers::WithinAbs;
@@ -370,7 +367,7 @@ TEST_CASE("roughness is stated where something has moved", "[heavy]") {
   CHECK(found->near_contact < 1.0);
 }
 
-TEST_CASE("a load that nothing carries is refused where the tissue gives way", "[heavy]") {
+TEST_CASE("a load that nothing carries is refused where the tissue collapses", "[heavy]") {
   CHECK_THAT(refusal_of([] {
                (void)run_of(small_scene(
                    R"("formulation": {"kind": "static", "solver": "iterative"},

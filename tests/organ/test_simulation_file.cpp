@@ -17,8 +17,6 @@
 #include "tpmkit/version.hpp"
 
 using namespace tpm;
-using namespace tpm::files;
-using namespace tpm::organ;
 using namespace tpm::plan;
 using Catch::Matchers::Contains;
 using Catch::Matchers::WithinAbs;

@@ -20,7 +20,6 @@
 #include "tpmkit/tpm_element.hpp"
 
 using namespace tpm;
-using namespace tpm::base;
 using namespace tpm::organ;
 using Eigen::Index;
 using Eigen::Vector3d;

@@ -14,7 +14,6 @@
 #include "tpm/organ/body/triangle_tree.hpp"
 
 using namespace tpm;
-using namespace tpm::base;
 using namespace tpm::organ;
 using namespace tpm::test;
 using Catch::Matchers::Contains;

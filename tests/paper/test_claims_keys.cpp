@@ -5,7 +5,6 @@
 #include "tpm/paper/claims/claims.hpp"
 
 using namespace tpm;
-using namespace tpm::files;
 using namespace tpm::paper;
 
 namespace {

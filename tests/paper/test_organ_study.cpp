@@ -10,9 +10,6 @@
 #include "tpmkit/tpm_element.hpp"
 
 using namespace tpm;
-using namespace tpm::files;
-using namespace tpm::organ;
-using namespace tpm::fit;
 using namespace tpm::paper;
 using namespace tpm::test;
 using Catch::Matchers::Contains;

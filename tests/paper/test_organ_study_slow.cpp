@@ -5,9 +5,6 @@
 #include "tpm/paper/organ_study.hpp"
 
 using namespace tpm;
-using namespace tpm::files;
-using namespace tpm::organ;
-using namespace tpm::fit;
 using namespace tpm::paper;
 using Catch::Matchers::WithinAbs;
 using Catch::Matchers::WithinRel;

@@ -14,8 +14,6 @@
 #include "tpm/paper/printed_comparison.hpp"
 
 using namespace tpm;
-using namespace tpm::files;
-using namespace tpm::fit;
 using namespace tpm::paper;
 using Catch::Matchers::Contains;
 using Catch::Matchers::WithinAbs;

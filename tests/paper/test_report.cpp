@@ -7,7 +7,6 @@
 #include "tpmkit/error.hpp"
 
 using namespace tpm;
-using namespace tpm::files;
 using namespace tpm::show;
 using Catch::Matchers::Contains;
 

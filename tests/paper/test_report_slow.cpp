@@ -13,10 +13,6 @@
 #include "tpm/show/draw.hpp"
 
 using namespace tpm;
-using namespace tpm::files;
-using namespace tpm::show;
-using namespace tpm::organ;
-using namespace tpm::fit;
 using namespace tpm::paper;
 namespace fs = std::filesystem;
 

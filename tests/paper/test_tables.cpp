@@ -10,10 +10,6 @@
 #include "tpmkit/error.hpp"
 
 using namespace tpm;
-using namespace tpm::base;
-using namespace tpm::files;
-using namespace tpm::show;
-using namespace tpm::fit;
 using namespace tpm::paper;
 using Catch::Matchers::WithinAbs;
 using Catch::Matchers::WithinRel;

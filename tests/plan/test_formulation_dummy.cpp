@@ -9,9 +9,6 @@
 #include "tpm/files/file.hpp"
 
 using namespace tpm;
-using namespace tpm::base;
-using namespace tpm::files;
-using namespace tpm::organ;
 using namespace tpm::accuracy;
 using test::answer_of;
 using test::names;

@@ -10,9 +10,6 @@
 #include "tpm/organ/run/scene_runner.hpp"
 
 using namespace tpm;
-using namespace tpm::base;
-using namespace tpm::files;
-using namespace tpm::organ;
 using namespace tpm::haptics;
 using Catch::Matchers::Contains;
 using test::experiment;

@@ -16,8 +16,6 @@
 #include "tpm/plan/show/view_simulation.hpp"
 
 using namespace tpm;
-using namespace tpm::files;
-using namespace tpm::organ;
 using namespace tpm::plan;
 using Catch::Matchers::Contains;
 using Catch::Matchers::WithinAbs;

@@ -9,7 +9,6 @@
 #include "tpmkit/error.hpp"
 
 using namespace tpm;
-using namespace tpm::organ;
 using namespace tpm::plan;
 using Catch::Matchers::Contains;
 using Catch::Matchers::WithinRel;

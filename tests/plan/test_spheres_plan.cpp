@@ -9,9 +9,6 @@
 #include "tpm/plan/spheres_plan.hpp"
 
 using namespace tpm;
-using namespace tpm::base;
-using namespace tpm::files;
-using namespace tpm::organ;
 using namespace tpm::plan;
 using Catch::Matchers::Contains;
 using Catch::Matchers::WithinAbs;

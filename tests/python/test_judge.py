@@ -38,7 +38,7 @@ class Judgements(unittest.TestCase):
             row = pooled.pooled.loc[p["name"]]
             self.assertEqual(row.identified, p["identified"])
             self.assertEqual(row.only_if_described, p.get("only_if_described", False))
-            self.assertEqual(row.only_without, p.get("only_without", ""))
+            self.assertEqual(row.only_without, p.get("only_without", {}).get("text", ""))
         self.assertEqual(pooled.pooled.loc["k_inf", "only_without"], "drift or a slow branch")
         spoilt = pooled.to_dict()
         spoilt["pooled"][0].update({"identified": False, "only_if_described": True})

@@ -4,7 +4,6 @@
 #include "tpm/show/json_table_csv.hpp"
 
 using namespace tpm;
-using namespace tpm::files;
 using namespace tpm::show;
 
 TEST_CASE("A table of JSON keeps its keys, and the units within, as CSV", "[csv]") {

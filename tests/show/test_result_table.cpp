@@ -6,7 +6,6 @@
 #include "tpm/show/result_table.hpp"
 
 using namespace tpm;
-using namespace tpm::files;
 using namespace tpm::show;
 
 namespace {

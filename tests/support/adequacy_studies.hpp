@@ -139,7 +139,7 @@ inline AdequacyOutcome fitted(const AdequacyTrial& trial, bool profiles = false)
                          : p.parameter.name == "k1"   ? 45.0
                          : p.parameter.name == "tau1" ? 2.0
                                                       : 0.0;
-    const bool told = !p.only_if_described && p.not_separable.empty();
+    const bool told = !p.only_if_described && !p.not_separable;
     if (truth == 0.0 || !p.standard_error || !told) continue;
     if (profiles && p.verdict != fit::Verdict::identified) continue;
     const double lower = profiles ? *p.lower : p.estimate - spread * *p.standard_error;
@@ -150,7 +150,7 @@ inline AdequacyOutcome fitted(const AdequacyTrial& trial, bool profiles = false)
   return outcome;
 }
 
-/// What the best fit to a recording without noise leaves (rms). Zero, contact and drift are what
+/// Residual (rms) of the best fit to a recording without noise. Zero, contact and drift are what
 /// that recording tells: those of a noisy one would leave something of their own.
 inline double left_without_noise(AdequacyTrial trial) {
   trial.noisy = false;

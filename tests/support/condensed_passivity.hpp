@@ -9,8 +9,6 @@
 #include "tpm/contact/condensed/condensed.hpp"
 
 namespace tpm::testing {
-using namespace base;
-using namespace organ;
 using namespace contact;
 
 struct EnergyAccount {

@@ -7,7 +7,6 @@
 #include "tpm/organ/balance/equilibrium.hpp"
 
 namespace tpm::testing {
-using namespace law;
 using namespace organ;
 
 /// Elongations are taken as linear over a step, under which every viscous elongation is advanced

@@ -15,8 +15,6 @@
 #include "tpmkit/law_model.hpp"
 
 namespace tpm::test {
-using namespace base;
-using namespace organ;
 using namespace fit;
 
 /// Successes of independent trials.

@@ -13,7 +13,7 @@
 namespace tpm::test {
 using namespace files;
 
-/// What it prints, and its exit code.
+/// Its output and exit code.
 struct DummyAnswer {
   std::string text;
   int code = 0;

@@ -69,7 +69,7 @@ inline void check_identified(const fit::Selection& s, const std::string& law,
     REQUIRE(known != truth.end());
     INFO(p.summary);
     CHECK(p.verdict == fit::Verdict::identified);
-    CHECK(p.not_separable.empty());
+    CHECK_FALSE(p.not_separable);
     REQUIRE(p.lower);
     REQUIRE(p.upper);
     CHECK(*p.lower <= known->value);

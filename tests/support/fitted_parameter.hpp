@@ -5,7 +5,6 @@
 #include "tpm/fit/fit.hpp"
 
 namespace tpm::fit {
-using namespace organ;
 using namespace fit;
 
 /// The result of the parameter of this name.

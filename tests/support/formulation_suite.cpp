@@ -17,11 +17,6 @@
 #include "tpmkit/error.hpp"
 
 namespace tpm::test {
-using namespace base;
-using namespace law;
-using namespace files;
-using namespace organ;
-using namespace plan;
 using namespace haptics;
 
 namespace {

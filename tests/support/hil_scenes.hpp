@@ -4,7 +4,6 @@
 #include "tpm/haptics/session/session.hpp"
 
 namespace tpm::test {
-using namespace files;
 using namespace haptics;
 
 /// A short session on the paper's star: one indentation to 4 mm and one load.

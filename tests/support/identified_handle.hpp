@@ -23,7 +23,7 @@ struct Handle {
   double late_share = 0.0, stall_every_s = 0.0, longest_stall_s = 0.0;
 };
 
-/// What a loop of 20 s with the forces of the identification sees of it.
+/// Its motion in a loop of 20 s with the forces of the identification.
 inline std::vector<IdentificationSample> moved(const Handle& h, std::uint64_t seed = 1) {
   constexpr int kParts = 20;
   const double part_s = h.period_s / kParts;

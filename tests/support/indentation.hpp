@@ -12,7 +12,6 @@
 #include "tpmkit/error.hpp"
 
 namespace tpm::organ {
-using namespace base;
 using namespace organ;
 
 /// A patch of spheres glued to a flat punch and pushed into a tissue at rest.

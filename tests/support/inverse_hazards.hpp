@@ -17,7 +17,7 @@
 
 namespace tpm::test {
 
-/// What became of one hazard of --device inverse3 on the stand-in service, or of tpm hil serve.
+/// Outcome of one hazard of --device inverse3 on the stand-in service, or of tpm hil serve.
 struct InverseHazardRow {
   std::string hazard;
   std::string expected;    ///< word of the fault, or part of the line that refuses

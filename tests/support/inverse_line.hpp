@@ -95,7 +95,7 @@ inline Json served(int late_periods, bool held) {
   return json;
 }
 
-/// What the client renders: within the limits of the device, patient with a busy machine.
+/// The session of the client: within the limits of the device, patient with a busy machine.
 inline Json rendered() {
   Json json = shipped("hil_inverse3.json");
   json["limits"].update({{"watchdog", "16 ms"}, {"cycle_timeout", "1 s"}, {"late_cycles", 1000}});
@@ -137,7 +137,7 @@ struct ServeBeside {
   int port = 0, events_port = 0;
 };
 
-/// What a second client, the mover, does with the hand once a recording has begun: rest, down, and
+/// Motion of the hand by a second client, the mover, once a recording has begun: rest, down, and
 /// up, until it is told to end.
 inline void press(int port, const std::string& recording, const std::atomic<bool>& ending) {
   WebSocketClient mover(port, "/", 5.0, kMostInventoryBytes);
@@ -158,7 +158,7 @@ inline void press(int port, const std::string& recording, const std::atomic<bool
   }
 }
 
-/// What the commands of docs/haptics.md answered.
+/// Answers of the commands of docs/haptics.md.
 struct LineRun {
   int identified = -1, ran = -1, verified = -1;  ///< exit codes; -1: not asked
   std::optional<double> found_s, largest_s;

@@ -52,7 +52,7 @@ struct LateHandSettings {
   double encoder_step_m = 1e-5, period_s = 1e-3;
 };
 
-/// What happened in a run with a hand.
+/// Outcome of a run with a hand.
 struct HandTrace {
   /// Of each part of a period: the force that acts less the one that would act if no delay had
   /// grown, N.

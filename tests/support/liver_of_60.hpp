@@ -5,8 +5,6 @@
 #include "tpmkit/protocol.hpp"
 
 namespace tpm::testing {
-using namespace files;
-using namespace organ;
 using namespace fit;
 
 inline Json liver_of_60() {

@@ -19,7 +19,7 @@ struct MadeTable {
 /// bytes.
 [[nodiscard]] MadeTable made_table(std::uint32_t seed);
 
-/// What came of reading it.
+/// Outcome of reading it.
 enum class ReadingResult {
   right,    ///< every number within rounding
   refused,  ///< an Error

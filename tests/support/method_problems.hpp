@@ -17,7 +17,6 @@
 namespace tpm_test {
 
 using namespace tpm;
-using namespace tpm::law;
 using namespace tpm::organ;
 
 /// A problem with its true answers.

@@ -18,7 +18,7 @@
 namespace tpm::test {
 using namespace files;
 
-/// Whether python3-jsonschema accepts each of the documents; none if no Python has it.
+/// True for each document that python3-jsonschema accepts; none if no Python has it.
 inline std::optional<std::vector<bool>> schema_verdicts(const Json& schema, const Json& documents) {
   const TempFolder folder;
   write_file(folder / "schema.json", to_text(schema));

@@ -44,7 +44,7 @@ struct Moduli {
 /// The spheres that lie deeper than `margin_m` below every face of the organ's bounding box.
 [[nodiscard]] std::vector<std::size_t> interior_spheres(const Organ& organ, double margin_m);
 
-/// What a block answers to six strains imposed on its boundary.
+/// Response of a block to six strains imposed on its boundary.
 struct PatchTest {
   Elasticity elasticity;
   std::size_t interior = 0;  ///< spheres that were free

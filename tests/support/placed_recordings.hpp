@@ -10,7 +10,6 @@
 #include "tpmkit/law_model.hpp"
 
 namespace tpm::test {
-using namespace base;
 using namespace fit;
 
 /// SI units. The tissue begins at depth 0.

@@ -13,7 +13,6 @@
 #include "tpmkit/tpm_element.hpp"
 
 namespace tpm::test {
-using namespace base;
 using namespace organ;
 
 inline const std::array<Eigen::Vector3d, 5> kPushes{

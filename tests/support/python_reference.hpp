@@ -32,7 +32,7 @@ inline std::string output_of(const std::string& command) {
   return text;
 }
 
-/// What such a reference prints.
+/// Output of such a reference.
 inline tpm::files::Json python_reference(const std::string& script, const std::string& arguments) {
   const std::string command = fmt::format("{} '{}/scripts/{}' {}", python_with_scipy(),
                                           TPM_TEST_SOURCE_DIR, script, arguments);

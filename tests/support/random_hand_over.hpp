@@ -9,7 +9,6 @@
 #include "tpm/contact/law_handover.hpp"
 
 namespace tpm::test {
-using namespace base;
 using namespace contact;
 
 inline LawFile random_law(Random& random) {

@@ -9,9 +9,6 @@
 #include "tpm/plan/plan.hpp"
 
 namespace tpm::test {
-using namespace base;
-using namespace files;
-using namespace organ;
 using namespace plan;
 
 /// A scene and a request, both decided by a seed and a number: livers of 50 to 200 spheres in two

@@ -11,8 +11,6 @@
 #include "tpmkit/tpm_element.hpp"
 
 namespace tpm::test {
-using namespace law;
-using namespace contact;
 using namespace haptics;
 
 /// A hand that goes to random places at random speeds, over the surface and into it, and now and

@@ -38,7 +38,7 @@ class RawClient {
       bytes.remove_prefix(static_cast<std::size_t>(count));
     }
   }
-  /// What comes until the other side closes, or for so long.
+  /// All bytes until the other side closes, or for so long.
   [[nodiscard]] std::string answer(double most_s = 10.0) const {
     std::string all;
     char buffer[4096];

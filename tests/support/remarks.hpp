@@ -7,7 +7,7 @@
 
 namespace tpm::test {
 
-/// Whether one of the remarks has this code.
+/// True if one of the remarks has this code.
 [[nodiscard]] inline bool has_remark(std::span<const Remark> remarks, std::string_view code) {
   return std::ranges::any_of(remarks, [&](const Remark& one) { return one.code == code; });
 }

@@ -11,7 +11,7 @@
 
 namespace tpm::test {
 
-/// What the program did: its exit code, -1 after a signal, and both streams.
+/// Outcome of the program: its exit code, -1 after a signal, and both streams.
 struct ProgramRun {
   int code;
   std::string said;

@@ -21,7 +21,7 @@ struct ServoSweep {
   float keep = 0.0F, of_start = 0.0F, of_end = 0.0F;
 };
 
-/// What ServoBonds::advance() does to such bonds, by one kernel over a vector type.
+/// The work of ServoBonds::advance() on such bonds, by one kernel over a vector type.
 struct ServoKernel {
   const char* name;
   void (*advance)(ServoSweep& sweep, const float* u, float* force);

@@ -30,7 +30,6 @@ inline std::vector<ErrorCase> session_cases() {
       {type, "binary garbage", run_session, session(kGarbage)},
       {type, "missing scene", run_session,
        session(R"({"model": {"kind": "condensed"}, "creep": {"loads": ["1 N"], "hold": "1 s"}})")},
-      {type, "model that was removed", run_session, with("\"condensed\"", "\"network_beside\"")},
       {type, "table of samples", run_session, session("time [s],depth [mm]\n0,0\n1,1\n")},
       {type, "scene is missing", run_session,
        session(R"({"model": {"scene": "none.json"}, "creep": {"loads": ["1 N"], "hold": "1 s"}})")},

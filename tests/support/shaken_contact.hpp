@@ -7,8 +7,6 @@
 #include "tpmkit/tpm_element.hpp"
 
 namespace tpm::test {
-using namespace law;
-using namespace contact;
 using namespace haptics;
 
 /// A device that is wherever a test puts it.

@@ -11,8 +11,6 @@
 #include "tpmkit/error.hpp"
 
 namespace tpm::test {
-using namespace base;
-using namespace files;
 using namespace organ;
 
 namespace {

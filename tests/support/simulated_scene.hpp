@@ -5,7 +5,6 @@
 #include "tpm/organ/run/simulation.hpp"
 
 namespace tpm::test {
-using namespace files;
 using namespace organ;
 
 inline ExperimentScene experiment(const std::string& scene) {

@@ -23,7 +23,7 @@
 namespace tpm::test {
 using namespace haptics;
 
-/// How the stand-in departs from a service that works.
+/// Departures of the stand-in from a service that works.
 struct StandInFaults {
   std::string version = "3.5.0.0";
   bool simulated = true;               ///< it says so
@@ -34,7 +34,7 @@ struct StandInFaults {
   bool no_inventory = false;           ///< it accepts and is silent
   bool no_events = false;              ///< nobody listens there
   bool names_no_filters = false, names_no_damping = false;
-  /// What it begins with; each is set by HTTP, force gate, damping and preset by a message too.
+  /// Initial settings; each is set by HTTP, force gate, damping and preset by a message too.
   std::string preset = "defaults", basis = "XYZ";
   double gate = 0.3, damping = 0.0, damping_along_z = 0.0, gravity = 0.0;
   double mount_turned_rad = 0.0, scale = 1.0;  ///< about x; of the mount

@@ -11,7 +11,6 @@
 #include "tpm/fit/uncertainty.hpp"
 
 namespace tpm::test {
-using namespace base;
 using namespace fit;
 
 /// A curve with two parameters: f(x, p) and its derivatives by p.

@@ -11,7 +11,6 @@
 #include "tpm/sweep/sweep_result.hpp"
 
 namespace tpm::test {
-using namespace files;
 using namespace sweep;
 
 inline Sweep parsed(std::string_view text) {

@@ -166,7 +166,7 @@ inline const QuantityComparison& study_quantity(const RecordingComparison& r, Qu
       r.quantities, [kind](const QuantityComparison& q) { return q.quantity.kind == kind; });
 }
 
-/// How often, for peak and end of the hold.
+/// Counts, for peak and end of the hold.
 struct StudyCounts {
   Count peak, end;
   void add(const RecordingComparison& r, double peak_error, double end_error) {

@@ -7,6 +7,7 @@
 
 #include "temp_folder.hpp"
 #include "tpm/files/file.hpp"
+#include "tpm/haptics/session/session_run.hpp"
 #include "tpmkit/error.hpp"
 
 namespace tpm::test {
@@ -22,20 +23,33 @@ class VendorScript {
   VendorScript(const VendorScript&) = delete;
   VendorScript& operator=(const VendorScript&) = delete;
 
-  [[nodiscard]] bool happened(const std::string& event) const {
+  /// When it happened first, of the library's clock; -1 if it did not.
+  [[nodiscard]] long long event_ns(const std::string& event) const {
     std::ifstream events(folder_ / "events");
     std::string name;
     long long time = 0;
     while (events >> name >> time) {
-      if (name == event) return true;
+      if (name == event) return time;
     }
-    return false;
+    return -1;
   }
+  [[nodiscard]] bool happened(const std::string& event) const { return event_ns(event) != -1; }
   [[nodiscard]] std::string file(const char* name) const { return folder_ / name; }
 
  private:
   TempFolder folder_;
 };
+
+/// The stand-in library as a device.
+/// @param file of the device; empty: none
+inline haptics::DeviceChoice stand_in_choice(const std::string& file = TPM_TEST_SOURCE_DIR
+                                             "/tests/fixtures/stand_in_device.json") {
+  haptics::DeviceChoice device;
+  device.kind = "omega7";
+  device.library = TPM_STAND_IN_DHD;
+  device.file = file;
+  return device;
+}
 
 /// Message of the Error(environment) that the action throws.
 inline std::string vendor_message_of(const std::function<void()>& act) {

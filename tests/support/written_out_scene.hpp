@@ -12,7 +12,6 @@
 
 namespace tpm_test {
 using namespace tpm;
-using namespace tpm::law;
 using namespace tpm::organ;
 using Catch::Matchers::WithinAbs;
 using Catch::Matchers::WithinRel;

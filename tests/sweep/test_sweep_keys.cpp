@@ -6,7 +6,6 @@
 #include "tpm/sweep/sweep_keys.hpp"
 
 using namespace tpm;
-using namespace tpm::files;
 using namespace tpm::sweep;
 
 namespace {

@@ -11,9 +11,6 @@
 #include "tpm/sweep/sweep_reader.hpp"
 
 using namespace tpm;
-using namespace tpm::files;
-using namespace tpm::organ;
-using namespace tpm::plan;
 using namespace tpm::sweep;
 
 namespace {

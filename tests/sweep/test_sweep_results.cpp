@@ -19,11 +19,6 @@
 #include "tpm/sweep/sweep_result.hpp"
 
 using namespace tpm;
-using namespace tpm::base;
-using namespace tpm::law;
-using namespace tpm::files;
-using namespace tpm::show;
-using namespace tpm::fit;
 using namespace tpm::sweep;
 using namespace tpm::paper;
 using Catch::Matchers::WithinRel;

@@ -146,7 +146,7 @@ class Contact:
 
     @property
     def info(self) -> dict[str, Any]:
-        """What does not change: model, error_bound, period_s, stiffness and its borders of stability and passivity,
+        """What does not change: model, error_bound, period_s, stiffness and its limits of stability and passivity,
         verdict, warnings, surface_m, push, force_limit_N, spheres."""
         found = self._core.info
         if self._no_device:

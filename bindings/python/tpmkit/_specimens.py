@@ -38,7 +38,7 @@ class Specimens:
             rows.append({"name": p["name"], "typical": p.get("typical_SI"), "lower": lower, "upper": upper,
                          "unit": p["unit"], "specimens": p["specimens"], "left_out": p["left_out"],
                          "identified": p["identified"], "only_if_described": p.get("only_if_described", False),
-                         "only_without": p.get("only_without", ""), "i_squared": p.get("i_squared"),
+                         "only_without": p.get("only_without", {}).get("text", ""), "i_squared": p.get("i_squared"),
                          "summary": p["summary"]})
         table = pd.DataFrame(rows).set_index("name")
         for column in ("typical", "lower", "upper"):

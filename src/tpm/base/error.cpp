@@ -23,14 +23,19 @@ std::string one_line(std::string_view where, std::string_view what, std::string_
 
 Error::Error(ExitCode code, std::string_view where, std::string_view what,
              std::string_view expected)
-    : std::runtime_error(one_line(where, what, expected)), code_(code) {}
+    : Error(code, ErrorCause::unspecified, where, what, expected) {}
 
 Error::Error(ExitCode code, ErrorCause cause, std::string_view where, std::string_view what,
              std::string_view expected)
-    : std::runtime_error(one_line(where, what, expected)), code_(code), cause_(cause) {}
+    : std::runtime_error(one_line(where, what, expected)),
+      code_(code),
+      cause_(cause),
+      reason_size_(one_line(where, what, {}).size()) {}
 
 Error Error::within(std::string_view outer) const {
-  return {code_, cause_, outer, what()};
+  Error whole(code_, cause_, outer, what());
+  whole.reason_size_ -= std::string_view(what()).size() - reason_size_;
+  return whole;
 }
 
 Error Error::with_code(ExitCode code) const {

@@ -127,37 +127,15 @@ using namespace show;
 using namespace fit;
 }  // namespace tpm::paper
 
-/// The program tpm.
+/// The program tpm: by these three rooms it sees all.
 namespace tpm::app {
-using namespace base;
-using namespace work;
-using namespace data;
-using namespace law;
-using namespace files;
-using namespace show;
-using namespace organ;
-using namespace contact;
-using namespace plan;
-using namespace fit;
-using namespace haptics;
 using namespace sweep;
 using namespace accuracy;
 using namespace paper;
 }  // namespace tpm::app
 
-/// The Python module.
+/// The Python module, likewise.
 namespace tpm::python {
-using namespace base;
-using namespace work;
-using namespace data;
-using namespace law;
-using namespace files;
-using namespace show;
-using namespace organ;
-using namespace contact;
-using namespace plan;
-using namespace fit;
-using namespace haptics;
 using namespace sweep;
 using namespace accuracy;
 using namespace paper;

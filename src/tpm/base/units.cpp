@@ -402,20 +402,6 @@ std::string_view si_symbol(Dimension dimension) noexcept {
   return entry_of(kDimensionWords, dimension).si;
 }
 
-std::string si_key(std::string_view name, Dimension dimension) {
-  std::string unit;
-  for (const char c : si_symbol(dimension)) {
-    if (c == '/') {
-      unit += "_per_";
-    } else if (c == ' ') {
-      unit += '_';
-    } else if (c != '^') {
-      unit += c;
-    }
-  }
-  return unit.empty() ? std::string(name) : fmt::format("{}_{}", name, unit);
-}
-
 Unit shown_unit(Dimension dimension) {
   std::string_view symbol = si_symbol(dimension);
   if (dimension == Dimension::length) symbol = "mm";

@@ -22,7 +22,7 @@ constexpr double kHold = 0.7;              // of an error, from one step to the 
 constexpr double kValidServoError = 0.02;  // error over the largest force
 constexpr double kScaleDepth_m = 1e-4;     // at which forces begin to count
 constexpr double kAside = 2.0;  // how much faster the fields change across the normal than along it
-// Rounding, of the largest force: at once, and of the viscous elongations, a step.
+// Rounding, of the largest force: instantaneous, and of the viscous elongations, a step.
 constexpr double kRounding = 3e-7;
 constexpr double kViscousRounding = 6e-9;
 constexpr double kLongestLag = 1e3;  // steps

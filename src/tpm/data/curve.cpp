@@ -14,7 +14,6 @@
 #include "tpmkit/error.hpp"
 
 namespace tpm {
-using namespace base;
 using namespace data;
 
 namespace {
@@ -57,6 +56,20 @@ bool is_step_response(Quantity quantity) noexcept {
 
 std::string_view quantity_short_name(Quantity quantity) noexcept {
   return entry_of(kQuantities, quantity).short_name;
+}
+
+std::string si_key(std::string_view name, Dimension dimension) {
+  std::string unit;
+  for (const char c : si_symbol(dimension)) {
+    if (c == '/') {
+      unit += "_per_";
+    } else if (c == ' ') {
+      unit += '_';
+    } else if (c != '^') {
+      unit += c;
+    }
+  }
+  return unit.empty() ? std::string(name) : fmt::format("{}_{}", name, unit);
 }
 
 std::string si_key(Quantity quantity, std::string_view part) {

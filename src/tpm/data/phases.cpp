@@ -273,7 +273,7 @@ class Finder {
         kSure * found_.noise_sd_estimate * std::sqrt(2.0 / static_cast<double>(half));
     if (rise > std::max(unsure, kConstant * std::abs(late))) return true;
     const std::size_t begin = std::max(phase.first, found_.contact_index);
-    if (begin >= first) return false;  // loaded at once
+    if (begin >= first) return false;  // loaded instantaneously
     const double late_s = mean_from(time_, last + 1 - half);
     const double apart_s = late_s - mean_from(time_, first);
     const double rise_on = (late - found_.floor_response) / (late_s - time_[begin]) * apart_s;

@@ -21,8 +21,5 @@ struct DocumentPlace {
 /// The same of what stands under a key. Throws Error(bad_input) with the key.
 [[nodiscard]] double quantity_at(const Json& object, std::string_view key, Dimension dimension,
                                  const DocumentPlace& place);
-/// The same; throws too unless it is above 0.
-[[nodiscard]] double positive_at(const Json& object, std::string_view key, Dimension dimension,
-                                 const DocumentPlace& place);
 
 }  // namespace tpm::files

@@ -49,10 +49,12 @@ void require_finite(const Json& value, const std::string& key) {
 
 }  // namespace
 
+Json remark_json(const Remark& remark) {
+  return {{"code", remark.code}, {"text", remark.text}};
+}
+
 Json remarks_json(std::span<const Remark> remarks) {
-  return array_json(remarks, [](const Remark& remark) {
-    return Json{{"code", remark.code}, {"text", remark.text}};
-  });
+  return array_json(remarks, remark_json);
 }
 
 Json or_null(double value) {

@@ -24,6 +24,7 @@ template <class Items, class Convert>
 }
 
 /// Remarks as every JSON has them: a list of {"code", "text"}.
+[[nodiscard]] Json remark_json(const Remark& remark);
 [[nodiscard]] Json remarks_json(std::span<const Remark> remarks);
 
 /// A number of a result with kResultDigits; null if it is not finite.

@@ -22,11 +22,17 @@ bool is_nuisance(const FitConfig& config, std::size_t parameter) {
                      [&](const Target& target) { return table[target.parameter].nuisance; });
 }
 
-bool is_contact_under_load(const FitConfig& config, std::size_t parameter) {
+bool is_contact(const FitConfig& config, std::size_t parameter) {
   if (!config.law || config.law->drive != Quantity::indentation_depth) return false;
   const std::vector<LawParameter> table = law_parameters(*config.law);
   return std::ranges::any_of(config.parameters[parameter].sets, [&](const Target& target) {
-    if (table[target.parameter].name != "contact") return false;
+    return table[target.parameter].name == "contact";
+  });
+}
+
+bool is_contact_under_load(const FitConfig& config, std::size_t parameter) {
+  if (!is_contact(config, parameter)) return false;
+  return std::ranges::any_of(config.parameters[parameter].sets, [&](const Target& target) {
     for (std::size_t i = 0; i < config.data.size(); ++i) {
       if (config.data[i].load_imposed && target.applies_to(i)) return true;
     }
@@ -243,7 +249,7 @@ void mark_not_separable(FitResult& result) {
   for (std::size_t i = 0; i < result.parameters.size(); ++i) {
     ParameterResult& p = result.parameters[i];
     p.not_separable = result.config.parameters[i].not_separable;
-    if (!p.not_separable.empty()) p.summary = parameter_words(p, result.config.level);
+    if (p.not_separable) p.summary = parameter_words(p, result.config.level);
   }
 }
 
@@ -270,7 +276,7 @@ void mark_conditions(FitResult& result, const ResidualFunction& function) {
       add_condition(all[i], condition_of(nuisance, bound.upper, false));
     }
   }
-  std::vector<Remark> undetermined(all.size());
+  std::vector<std::optional<Remark>> undetermined(all.size());
   for (std::size_t i = 0; i < all.size(); ++i) {
     if (!is_contact_under_load(result.config, i)) continue;
     if (all[i].at_lower_bound || all[i].at_upper_bound) {
@@ -283,8 +289,8 @@ void mark_conditions(FitResult& result, const ResidualFunction& function) {
     if (p.first_bounds) {
       result.remarks.push_back({"bounds_widened", widening_words(p)});
     }
-    if (!undetermined[i].code.empty()) {
-      result.remarks.push_back(std::move(undetermined[i]));
+    if (undetermined[i]) {
+      result.remarks.push_back(*std::move(undetermined[i]));
     } else if (p.nuisance && (p.at_lower_bound || p.at_upper_bound)) {
       result.remarks.push_back({"nuisance_at_bound", bound_flag(result, p)});
     }

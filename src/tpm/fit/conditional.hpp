@@ -9,6 +9,9 @@ namespace tpm::fit {
 /// error, size of the noise) and not to the material.
 [[nodiscard]] bool is_nuisance(const FitConfig& config, std::size_t parameter);
 
+/// True if an estimated parameter sets the depth of contact.
+[[nodiscard]] bool is_contact(const FitConfig& config, std::size_t parameter);
+
 /// True for the depth of contact under an imposed force. No rest measures it, unlike that under an
 /// imposed depth: on a bound it is undetermined.
 [[nodiscard]] bool is_contact_under_load(const FitConfig& config, std::size_t parameter);

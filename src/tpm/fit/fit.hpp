@@ -44,7 +44,7 @@ struct ParameterResult {
   std::vector<Condition> conditional_on;
   /// Effects that the recording cannot separate from it ("drift or a slow branch"); it is then not
   /// identified, whatever its profile says. See EstimatedParameter.
-  std::string not_separable;
+  std::optional<Remark> not_separable;
   /// Of a fit with a drift of the zero, where no rest tells one: `lower` and `upper` then hold this
   /// interval, too.
   std::optional<WithDrift> with_drift = std::nullopt;

@@ -253,7 +253,7 @@ std::optional<LawUncertainty> uncertainty_of(const FitResult& fit, const LawSpec
   u.data = fitted_files(fit);
   for (const ParameterResult& p : fit.parameters) {
     if (p.at_lower_bound || p.at_upper_bound) u.at_bound.push_back(p.parameter.name);
-    if (!p.not_separable.empty()) u.not_separable.push_back(p.parameter.name);
+    if (p.not_separable) u.not_separable.push_back(p.parameter.name);
     if (p.unconfirmed) u.unconfirmed.push_back(p.parameter.name);
   }
   return u;

@@ -133,11 +133,11 @@ std::string range_words(const ParameterResult& p, double level) {
     case Verdict::identified: {
       const std::string interval =
           fmt::format("{} to {}", in_sized_unit(p, *p.lower), in_sized_unit(p, *p.upper));
-      if (!p.not_separable.empty()) {
+      if (p.not_separable) {
         return fmt::format(
             "{} = {} is not identified: {}: not separable; {} interval without {} {}", f.name,
-            in_sized_unit(p, p.estimate), p.not_separable, percent(level),
-            p.not_separable.starts_with("drift") ? "drift" : "such a branch", interval);
+            in_sized_unit(p, p.estimate), p.not_separable->text, percent(level),
+            p.not_separable->code == kDriftOrBranch ? "drift" : "such a branch", interval);
       }
       if (p.unconfirmed) {
         return fmt::format("{} = {} is not identified: {}; {} interval of this minimum {}", f.name,
@@ -177,8 +177,8 @@ std::string parameter_words(const ParameterResult& p, double level) {
 }
 
 std::string verdict_text(const ParameterResult& p) {
-  if (!p.not_separable.empty()) {
-    return fmt::format("not identified: {}: not separable", p.not_separable);
+  if (p.not_separable) {
+    return fmt::format("not identified: {}: not separable", p.not_separable->text);
   }
   if (p.unconfirmed) return "not identified: " + p.unconfirmed->text;
   std::string text(verdict_name(p.verdict));

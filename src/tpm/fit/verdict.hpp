@@ -31,6 +31,9 @@ namespace tpm::fit {
 /// One sentence for a reader, made from the numbers.
 [[nodiscard]] std::string parameter_words(const ParameterResult& parameter, double level);
 
+/// Code of ParameterResult::not_separable where no rest tells a drift of the zero.
+inline constexpr const char* kDriftOrBranch = "drift_or_slow_branch";
+
 /// "eta1 = 5 Pa s is excluded by these data (...)" or "undetermined ...".
 [[nodiscard]] std::string hypothesis_words(const HypothesisResult& result, double level);
 

@@ -15,7 +15,6 @@
 #include "tpmkit/law_model.hpp"
 
 namespace tpm {
-using namespace base;
 using namespace law;
 
 namespace {

@@ -9,11 +9,11 @@
 
 namespace tpm::law {
 
-/// Creep at many times from creep at few: the answer to a load that is imposed at once and kept is
-/// a smooth function of the logarithm of the time (relaxation and retardation spread over more than
-/// half a decade whatever their spectrum), so that Chebyshev interpolation on pieces of half a
-/// decade reproduces it to some 1e-12. The answer to a kept depth is not tabulated: it may fall by
-/// any number of decades, and then its digits are those of the largest value of a piece.
+/// Creep at many times from creep at few: the answer to a load that is imposed instantaneously and
+/// kept is a smooth function of the logarithm of the time (relaxation and retardation spread over
+/// more than half a decade whatever their spectrum), so that Chebyshev interpolation on pieces of
+/// half a decade reproduces it to some 1e-12. The answer to a kept depth is not tabulated: it may
+/// fall by any number of decades, and then its digits are those of the largest value of a piece.
 class KeptLoadTable {
  public:
   /// Nothing for other histories, and where the table would not be much smaller than the times.

@@ -21,7 +21,6 @@
 #include "tpmkit/error.hpp"
 
 namespace tpm {
-using namespace base;
 using namespace law;
 
 namespace {

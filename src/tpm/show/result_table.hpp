@@ -27,7 +27,7 @@ template <class T>
   }
 }
 
-/// What a column holds of a row: a data member, a member function or a function of the row.
+/// The value of a column in a row: a data member, a member function or a function of the row.
 template <class Row>
 class ResultMember {
  public:

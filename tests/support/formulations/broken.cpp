@@ -3,7 +3,6 @@
 
 namespace tpm {
 using namespace organ;
-using namespace files;
 namespace {
 
 /// Says that it answers the star as its closed form does. It forgets the tension, pulls at rest,

@@ -4,7 +4,6 @@
 
 namespace tpm {
 using namespace organ;
-using namespace files;
 namespace {
 
 /// The contact as an elastic spring with the network's equilibrium stiffness at rest:

@@ -6,7 +6,7 @@
 
 namespace tpm::haptics {
 
-/// What became of one hazard on the clock: the loop with its threads, the simulated device.
+/// Outcome of one hazard on the clock: the loop with its threads, the simulated device.
 struct ClockHazardRow {
   std::string hazard, setting;
   StopCause expected = StopCause::none;  ///< what it should end in

@@ -6,7 +6,7 @@
 
 namespace tpm::haptics {
 
-/// What became of one hazard, on the simulated device in virtual time.
+/// Outcome of one hazard, on the simulated device in virtual time.
 struct HazardRow {
   std::string hazard, setting;
   bool unchecked = false;  ///< run although the check refused it, in the row before
@@ -26,7 +26,7 @@ struct HazardRow {
   bool within = false;  ///< what HazardBounds state
 };
 
-/// What the rows are compared with.
+/// The reference of the rows.
 struct HazardBounds {
   double force_N = 8.0;               ///< the session's limit
   double rise_N = 0.4;                ///< the same of a period, 400 N/s at 1 kHz

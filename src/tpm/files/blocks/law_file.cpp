@@ -16,8 +16,6 @@
 #include "tpmkit/law_model.hpp"
 
 namespace tpm {
-using namespace base;
-using namespace data;
 using namespace files;
 
 namespace {

@@ -17,7 +17,6 @@
 #include "tpmkit/law_file.hpp"
 
 namespace tpm {
-using namespace base;
 using namespace files;
 
 namespace {

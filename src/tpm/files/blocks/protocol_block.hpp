@@ -18,8 +18,8 @@ namespace tpm::files {
 /// The protocols that files name.
 enum class ProtocolKind {
   ramp_hold,  ///< from rest to `depth` at `rate`, then held for `hold`
-  step_hold,  ///< at once to `depth`, then held for `hold`
-  creep,      ///< `load` at once, kept for `duration`
+  step_hold,  ///< instantaneously to `depth`, then held for `hold`
+  creep,      ///< `load` applied instantaneously, kept for `duration`
   knots,      ///< linear between corners
 };
 

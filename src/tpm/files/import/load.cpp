@@ -19,9 +19,6 @@
 #include "tpmkit/error.hpp"
 
 namespace tpm {
-using namespace base;
-using namespace files;
-
 using namespace files;
 
 namespace fs = std::filesystem;

@@ -57,9 +57,9 @@ void resolve_specimen(ColumnUse& drive, ColumnUse& response, const std::string& 
 /// relative lengths or strains and stresses.
 void divide_by_size(ImportedSeries& series, const ImportOptions& options);
 
-/// What the unit says of a column whose title says nothing or something else: "f [Hz]", "w
-/// [rad/s]", "J [1/Pa]"; "x [mm]" is a displacement and "y [N]" a force; with a time beside it
-/// "G [Pa]" and "E [Pa]" are relaxation moduli.
+/// The quantity that the unit tells where the title of a column says nothing or something else: "f
+/// [Hz]", "w [rad/s]", "J [1/Pa]"; "x [mm]" is a displacement and "y [N]" a force; with a time
+/// beside it "G [Pa]" and "E [Pa]" are relaxation moduli.
 void recognize_by_unit(MachineColumn& column, bool timed);
 
 /// "T" is a time only where its unit says so or where nothing contradicts: it may be a temperature.

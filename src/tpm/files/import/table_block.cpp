@@ -111,16 +111,6 @@ SampleBlock block_below(const DelimitedTable& table, std::size_t header_rows) {
   return {0, header_rows, table.rows.size(), table.rows[header_rows].fields.size()};
 }
 
-std::vector<std::string_view> column_fields(const DelimitedTable& table, const SampleBlock& block,
-                                            std::size_t column) {
-  std::vector<std::string_view> fields;
-  fields.reserve(block.size());
-  for (std::size_t i = block.first; i < block.end; ++i) {
-    fields.push_back(field_at(table.rows[i], column));
-  }
-  return fields;
-}
-
 std::string lines_of(const DelimitedTable& table, std::size_t first, std::size_t end) {
   const int from = table.rows[first].line, to = table.rows[end - 1].line;
   return from == to ? fmt::format("line {}", from) : fmt::format("lines {} to {}", from, to);

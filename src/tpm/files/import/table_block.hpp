@@ -27,11 +27,6 @@ struct SampleBlock {
 /// The block of all rows from `header_rows` on.
 [[nodiscard]] SampleBlock block_below(const DelimitedTable& table, std::size_t header_rows);
 
-/// The block's fields of one column, an empty one where a row is too short.
-[[nodiscard]] std::vector<std::string_view> column_fields(const DelimitedTable& table,
-                                                          const SampleBlock& block,
-                                                          std::size_t column);
-
 /// "lines 12 to 300"
 [[nodiscard]] std::string lines_of(const DelimitedTable& table, std::size_t first, std::size_t end);
 

@@ -21,7 +21,7 @@ namespace tpm::fit {
 struct PlannedExperiment {
   enum class Kind {
     ramp_hold,  ///< to `depth_m` at `rate_m_per_s`, then held for `hold_s`
-    creep,      ///< `load_N` at once, held for `hold_s`
+    creep,      ///< `load_N` applied instantaneously, held for `hold_s`
   };
   Kind kind = Kind::ramp_hold;
   double depth_m = 0.0;       ///< ramp_hold, > 0

@@ -46,7 +46,7 @@ ComparedQuantity compared(const TwoGroups& groups, const std::array<std::string,
   for (std::size_t g = 0; g < 2; ++g) {
     q.left_out[g] = groups[g].left_out;
     q.not_described[g] = groups[g].not_described;
-    if (!groups[g].only_without.empty()) {
+    if (groups[g].only_without) {
       q.only_without = groups[g].only_without;
     } else {
       q.left_out[g] += groups[g].not_separable;
@@ -97,7 +97,7 @@ ParameterEstimates times(ParameterEstimates found, double factor) {
   return found;
 }
 
-/// What resists at once: a sum, of which each fit has its own standard error.
+/// The instantaneous coefficient: a sum, of which each fit has its own standard error.
 ParameterEstimates sum_estimates(std::span<const SpecimenRow> rows, const std::string& modulus,
                                  const ContactGeometry& probe) {
   ParameterEstimates found;

@@ -26,8 +26,8 @@ struct ComparedQuantity {
   double p_holm = 1.0;  ///< p_value, adjusted by Holm for all quantities that are compared
   std::string reason;   ///< why there is no difference
   /// A group's recordings do not tell it from this ("drift or a slow branch"): the difference holds
-  /// only without it. Empty: they do.
-  std::string only_without;
+  /// only without it. None: they do.
+  std::optional<Remark> only_without;
   /// Recordings among those compared that the law does not describe: the difference holds only if
   /// it did.
   std::array<int, 2> not_described{};

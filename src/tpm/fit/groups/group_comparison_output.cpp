@@ -36,7 +36,7 @@ Json typical_json(const ComparedQuantity& q, std::size_t group, const std::strin
 Json quantity_json(const GroupComparison& c, const ComparedQuantity& q) {
   Json j{{"name", q.parameter.name}, {"unit", q.si_unit}};
   j["groups"] = Json::array({typical_json(q, 0, c.names[0]), typical_json(q, 1, c.names[1])});
-  if (!q.only_without.empty()) j["not_separable"] = q.only_without;
+  if (q.only_without) j["not_separable"] = remark_json(*q.only_without);
   if (q.not_described[0] + q.not_described[1] > 0) j["only_if_described"] = true;
   if (!q.difference) {
     j["reason"] = q.reason;
@@ -102,7 +102,7 @@ std::string conclusion(const GroupComparison& c) {
   bool described = true;
   const double alpha = 1.0 - c.study.level;
   for (const ComparedQuantity& q : c.parameters) {
-    if (!q.difference || !q.only_without.empty()) continue;
+    if (!q.difference || q.only_without) continue;
     (q.p_holm < alpha ? differ : open).push_back(q.parameter.name);
     described = described && q.not_described[0] + q.not_described[1] == 0;
   }

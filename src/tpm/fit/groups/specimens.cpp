@@ -171,11 +171,9 @@ bool is_not_described(const FitResult& fit) {
   return fit.adequacy && fit.adequacy->is_rejected();
 }
 
-std::string pooled_doubt(const std::string& only_without, int not_described) {
+std::string pooled_doubt(const std::optional<Remark>& only_without, int not_described) {
   std::string words;
-  if (!only_without.empty()) {
-    words = fmt::format("not identified: {}: not separable", only_without);
-  }
+  if (only_without) words = fmt::format("not identified: {}: not separable", only_without->text);
   if (not_described > 0) {
     words += words.empty() ? "" : "; ";
     words += "only if the law described the data";
@@ -216,7 +214,7 @@ ParameterEstimates parameter_estimates(std::span<const SpecimenRow> rows, const 
       continue;
     }
     const double slope = parameter.scale == Scale::log ? r.estimate : 1.0;
-    const bool separable = r.not_separable.empty();
+    const bool separable = !r.not_separable;
     if (!separable) {
       found.doubt = r.not_separable;
       ++found.not_separable;
@@ -247,12 +245,12 @@ std::vector<PooledParameter> pool_specimens(const std::vector<SpecimenRow>& rows
                       found.left_out,     found.not_separable,
                       found.only_without, found.not_described};
     p.effects.summary = in_natural_words(p);
-    if (!p.only_without.empty()) {
+    if (p.only_without) {
       p.effects.summary +=
-          fmt::format("; not identified: {}: not separable in any recording", p.only_without);
+          fmt::format("; not identified: {}: not separable in any recording", p.only_without->text);
     } else if (p.not_separable > 0) {
       p.effects.summary +=
-          fmt::format("; {} more left out: {}: not separable", p.not_separable, found.doubt);
+          fmt::format("; {} more left out: {}: not separable", p.not_separable, found.doubt->text);
     }
     if (p.not_described > 0) {
       p.effects.summary += fmt::format(
@@ -321,7 +319,7 @@ Json to_json(const SpecimenStudy& study) {
                {"not_separable", p.not_separable},
                {"identified", p.identified()},
                {"summary", e.summary}};
-    if (!p.only_without.empty()) entry["only_without"] = p.only_without;
+    if (p.only_without) entry["only_without"] = remark_json(*p.only_without);
     if (p.not_described > 0) entry["only_if_described"] = true;
     const char* of = p.parameter.scale == Scale::log ? "of_log" : "SI";
     const auto sd_key = [&](const char* between) {

@@ -37,12 +37,12 @@ struct PooledParameter {
                           ///< unless all are such
   /// All of them are such, and this is what they do not tell it from ("drift or a slow branch"):
   /// what is pooled is not identified, and holds only without that.
-  std::string only_without = {};
+  std::optional<Remark> only_without = std::nullopt;
   /// Recordings among those pooled that the law does not describe: what is pooled is not identified
   /// without the condition that it did.
   int not_described = 0;
 
-  [[nodiscard]] bool identified() const { return only_without.empty() && not_described == 0; }
+  [[nodiscard]] bool identified() const { return !only_without && not_described == 0; }
 };
 
 struct SpecimenStudy {
@@ -75,17 +75,18 @@ struct ParameterEstimates {
   FitParameter parameter;  ///< of log scale unless it may be negative
   std::vector<SpecimenEstimate> estimates;
   int left_out = 0;
-  int not_separable = 0;     ///< as PooledParameter
-  std::string only_without;  ///< as PooledParameter
-  std::string doubt;         ///< what `not_separable` recordings do not tell it from
-  int not_described = 0;     ///< as PooledParameter
+  int not_separable = 0;               ///< as PooledParameter
+  std::optional<Remark> only_without;  ///< as PooledParameter
+  std::optional<Remark> doubt;         ///< what `not_separable` recordings do not tell it from
+  int not_described = 0;               ///< as PooledParameter
 };
 /// @param like a row that was fitted: what parameter i is
 [[nodiscard]] ParameterEstimates parameter_estimates(std::span<const SpecimenRow> rows,
                                                      const SpecimenRow& like, std::size_t i);
 
 /// Why what is pooled (or compared) is not identified, in words; empty if it is.
-[[nodiscard]] std::string pooled_doubt(const std::string& only_without, int not_described);
+[[nodiscard]] std::string pooled_doubt(const std::optional<Remark>& only_without,
+                                       int not_described);
 
 /// True if the law does not describe the data of a fit.
 [[nodiscard]] bool is_not_described(const FitResult& fit);

@@ -66,7 +66,7 @@ std::optional<YoungModulus> sum_of(const FitResult& fit, const std::vector<std::
                    {},
                    {},
                    "linearised",
-                   pooled_doubt("", is_not_described(fit))};
+                   pooled_doubt(std::nullopt, is_not_described(fit))};
   Eigen::VectorXd direction = Eigen::VectorXd::Zero(std::ssize(c.free));
   for (const std::size_t i : places) {
     const ParameterResult& p = fit.parameters[i];
@@ -131,7 +131,7 @@ std::optional<YoungModulus> pooled_sum(const SpecimenStudy& study, double factor
                       std::exp(effects.interval.lower),
                       std::exp(effects.interval.upper),
                       "pooled",
-                      typical_words(effects.specimens, pooled_doubt("", not_described))};
+                      typical_words(effects.specimens, pooled_doubt(std::nullopt, not_described))};
 }
 
 }  // namespace

@@ -129,9 +129,8 @@ struct EstimatedParameter {
   std::optional<Prior> prior = std::nullopt;
   std::optional<DriftTerm> drift = std::nullopt;
   std::optional<RiseTerm> rise = std::nullopt;
-  /// Effects that these data cannot separate from the parameter, in words; it is then not called
-  /// identified.
-  std::string not_separable = {};
+  /// Effects that these data cannot separate from the parameter; it is then not called identified.
+  std::optional<Remark> not_separable = std::nullopt;
 };
 
 /// A claim about parameters, tested by holding them: "eta1 = 5 Pa s".

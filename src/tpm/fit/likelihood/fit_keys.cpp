@@ -4,6 +4,7 @@
 #include <iterator>
 
 #include "tpm/files/blocks/law_json.hpp"
+#include "tpm/files/keys/more_types.hpp"
 #include "tpm/fit/likelihood/fit_words.hpp"
 
 namespace tpm::fit {
@@ -79,7 +80,7 @@ const Block<StatedParameter>& parameter_block() {
        key("rise", &P::rise, rise_block().type(),
            "the parameter is the delay of a rise of the drive between two samples, such as \"10 "
            "ms\""),
-       key("not_separable", &P::not_separable, text(1),
+       key("not_separable", &P::not_separable, remark(),
            "what the data cannot tell the parameter from; it is then not called identified")},
       {{"a drift or a rise of one recording alone", [](const P& p) -> std::optional<Fault> {
           const bool alone = p.drift || p.rise;

@@ -14,8 +14,8 @@ namespace tpm::fit {
 /// The same with tables in place of parameters, fixed values and data.
 [[nodiscard]] const FileKind& fit_tables_kind();
 
-/// What a configuration states. Throws Error(bad_input), at the key, for what has not the form or
-/// breaks a rule about several keys.
+/// The contents of a configuration. Throws Error(bad_input), at the key, for what has not the form
+/// or breaks a rule about several keys.
 [[nodiscard]] StatedFit stated_fit(const Json& document, std::string_view where);
 
 /// The tables of a problem, relative to its file.

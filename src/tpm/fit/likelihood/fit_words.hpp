@@ -27,7 +27,7 @@ inline constexpr auto kErrorShapeWords =
                                      {ErrorShape::laplace, "laplace"},
                                      {ErrorShape::student_t, "student_t"}});
 
-/// Whether the size of the noise is known.
+/// True if the size of the noise is known.
 inline constexpr auto kNoiseScaleWords =
     std::to_array<Word<bool>>({{true, "known"}, {false, "estimated"}});
 

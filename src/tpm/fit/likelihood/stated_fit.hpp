@@ -102,7 +102,7 @@ struct StatedParameter {
   std::optional<StatedPrior> prior;
   std::optional<StatedDrift> drift;
   std::optional<StatedRise> rise;
-  std::string not_separable;
+  std::optional<Remark> not_separable;
   DocumentPlace place = {};
 };
 

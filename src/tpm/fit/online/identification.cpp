@@ -105,7 +105,7 @@ LawUncertainty uncertainty_of(const SequentialEstimate& e, double level) {
   return u;
 }
 
-/// Laws that can be fitted sample by sample and that a hand tells apart.
+/// Laws that can be fitted sample by sample and that differ noticeably.
 std::vector<LawSpec> live_laws() {
   std::vector<LawSpec> laws;
   for (const Kernel kernel : {Kernel::linear, Kernel::power}) {

@@ -66,7 +66,7 @@ Json to_json(const ErrorBudget& b) {
   json["data_part"] = stored(b.data_part);
   json["computed_part"] = stored(b.computed_part);
   json["thresholds"] = thresholds();
-  json["sentences"] = b.sentences;
+  json["sentences"] = remarks_json(b.sentences);
   json["remarks"] = remarks_json(b.remarks);
   json["time_s"] = b.time_s;
   json["stages"] = stages;
@@ -98,7 +98,7 @@ std::string to_terminal_text(const ErrorBudget& b) {
   }
   text += fmt::format("{:<54} {:>9}\n\n", b.instrument ? "all in quadrature" : "both in quadrature",
                       in_percent(b.combined));
-  for (const std::string& sentence : b.sentences) text += sentence + "\n";
+  for (const Remark& sentence : b.sentences) text += sentence.text + "\n";
   text += "\njust noticeable differences:";
   for (const Json& t : thresholds()) {
     text += fmt::format("\n  {:>4} %  {} ({})", in_percent(t.at("share").get<double>()),

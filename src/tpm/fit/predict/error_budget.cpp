@@ -54,51 +54,58 @@ std::string part_text(double part) {
   return significant(100.0 * part, 3) + " %";
 }
 
-std::string hand_sentence(const ErrorBudget& budget) {
+Remark noticeable_remark(const ErrorBudget& budget) {
   const double all = budget.combined;
   if (all < kForceJnd) {
     // Without a recording the chain begins with the law: its own error is in no line.
     const bool compared = std::ranges::any_of(
         budget.lines, [](const BudgetLine& line) { return line.name == "law"; });
-    return fmt::format(
-        "the whole chain ({}) stays below the just noticeable difference of a force ({}): "
-        "measuring or computing finer would not be felt{}",
-        part_text(all), part_text(kForceJnd),
-        compared ? "" : ", if the law is right: no recording is compared with it");
+    return {"not_noticeable",
+            fmt::format(
+                "the whole chain ({}) stays below the just noticeable difference of a force ({}): "
+                "measuring or computing finer would not be felt{}",
+                part_text(all), part_text(kForceJnd),
+                compared ? "" : ", if the law is right: no recording is compared with it")};
   }
   if (all < kStiffnessThroughTool) {
-    return fmt::format(
-        "the whole chain ({}) may be felt as a force (from {} on); the just noticeable "
-        "difference of a stiffness felt through a tool is {}",
-        part_text(all), part_text(kForceJnd), part_text(kStiffnessThroughTool));
+    return {
+        "noticeable_as_force",
+        fmt::format("the whole chain ({}) may be felt as a force (from {} on); the just noticeable "
+                    "difference of a stiffness felt through a tool is {}",
+                    part_text(all), part_text(kForceJnd), part_text(kStiffnessThroughTool))};
   }
-  return fmt::format("the whole chain ({}) is above every threshold of a hand listed here",
-                     part_text(all));
+  return {"noticeable",
+          fmt::format("the whole chain ({}) is above every threshold of a hand listed here",
+                      part_text(all))};
 }
 
-std::string waste_sentence(const ErrorBudget& budget) {
+Remark finer_remark(const ErrorBudget& budget) {
   constexpr double kFiner = 0.3;  // of the data's part: in quadrature 4 % of it
   if (!(budget.data_part > 0.0))
-    return "the data uncertainty is not known: no fit stands behind it";
+    return {"data_part_unknown", "the data uncertainty is not known: no fit stands behind it"};
   if (budget.computed_part < kFiner * budget.data_part) {
-    return fmt::format("data uncertainty {}, lost by computing {}: computing finer would be wasted",
-                       part_text(budget.data_part), part_text(budget.computed_part));
+    return {
+        "finer_is_wasted",
+        fmt::format("data uncertainty {}, lost by computing {}: computing finer would be wasted",
+                    part_text(budget.data_part), part_text(budget.computed_part))};
   }
-  return fmt::format(
-      "what is lost by computing ({}) is not small against the data uncertainty ({}): computing "
-      "finer pays",
-      part_text(budget.computed_part), part_text(budget.data_part));
+  return {"finer_pays",
+          fmt::format("what is lost by computing ({}) is not small against the data uncertainty "
+                      "({}): computing finer pays",
+                      part_text(budget.computed_part), part_text(budget.data_part))};
 }
 
-std::string largest_sentence(const ErrorBudget& budget) {
+Remark largest_remark(const ErrorBudget& budget) {
   const auto most = std::ranges::max_element(
       budget.lines, [](const auto& a, const auto& b) { return a.largest < b.largest; });
   if (budget.random && budget.random->largest > most->largest) {
-    return fmt::format("the largest is the uncertainty of the law's parameters, {} of the peak",
-                       part_text(budget.random->largest));
+    return {"largest_is_parameters",
+            fmt::format("the largest is the uncertainty of the law's parameters, {} of the peak",
+                        part_text(budget.random->largest))};
   }
-  return fmt::format("the largest line is {}, {} of the peak at {} s", most->name,
-                     part_text(most->largest), significant(most->largest_at_s, 4));
+  return {"largest_is_line",
+          fmt::format("the largest line is {}, {} of the peak at {} s", most->name,
+                      part_text(most->largest), significant(most->largest_at_s, 4))};
 }
 
 }  // namespace
@@ -154,7 +161,7 @@ void conclude(ErrorBudget& budget) {
   budget.data_part = std::hypot(law, scatter);
   budget.computed_part = largest_sum(
       budget, [](const BudgetLine& line) { return line.kind == BudgetKind::computation; });
-  budget.sentences = {largest_sentence(budget), waste_sentence(budget), hand_sentence(budget)};
+  budget.sentences = {largest_remark(budget), finer_remark(budget), noticeable_remark(budget)};
 }
 
 double tolerance_of_data(const Json& budget, std::string_view where) {

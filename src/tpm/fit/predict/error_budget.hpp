@@ -69,7 +69,7 @@ struct ErrorBudget {
   double data_part = 0.0;      ///< the line `law` (if there is one), random part and instrument in
                                ///< quadrature
   double computed_part = 0.0;  ///< max |sum| of the lines of computation
-  std::vector<std::string> sentences;
+  std::vector<Remark> sentences;  ///< the conclusions, in their order
   std::vector<Remark> remarks;
 };
 

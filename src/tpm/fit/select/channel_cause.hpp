@@ -7,7 +7,7 @@
 
 namespace tpm::fit {
 
-/// What makes one channel of a recording late beside the other.
+/// Cause of a delay between the two channels of a recording.
 enum class ChannelFault {
   response_delayed,  ///< by a constant time
   drive_delayed,

@@ -6,7 +6,7 @@
 
 namespace tpm::fit {
 
-/// What select_law() warns of, for the fit of a configuration, so that a configuration that
+/// The warnings of select_law(), for the fit of a configuration, so that a configuration that
 /// `tpm fit RECORDING` has written warns of the same: what must be known of each recording
 /// (recording_remarks), what the protocol cannot resolve (protocol_remarks) or, of one material
 /// function, its range (function_remarks), and samples after the window (outside_remarks). Beside

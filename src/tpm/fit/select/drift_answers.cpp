@@ -19,7 +19,7 @@ namespace {
 
 const ParameterResult* not_separable_in(const FitResult& fit) {
   const auto found = std::ranges::find_if(
-      fit.parameters, [](const ParameterResult& p) { return !p.not_separable.empty(); });
+      fit.parameters, [](const ParameterResult& p) { return p.not_separable.has_value(); });
   return found == fit.parameters.end() ? nullptr : &*found;
 }
 
@@ -40,7 +40,7 @@ bool has_limits_of(const ParameterResult& p, const ParameterResult& other) {
 /// its standard error grows until the interval that it stands for holds them.
 /// @param other of the fit with a drift; nothing if none was found
 /// @param spread half an interval, in standard errors
-void hold_both(ParameterResult& p, const ParameterResult* other, const std::string& doubt,
+void hold_both(ParameterResult& p, const ParameterResult* other, const std::optional<Remark>& doubt,
                double level, double spread) {
   const bool profiled = p.verdict != Verdict::not_profiled;
   if (other != nullptr && !profiled && p.standard_error && other->standard_error) {
@@ -143,7 +143,7 @@ std::optional<DriftAnswers> give_both_drift_answers(FitResult& fit,
   std::optional<FitResult> drifting;
   const std::string failure = gave_up([&] { drifting = run_fit(config, data); });
   if (!failure.empty()) drifting.reset();
-  const std::string doubt = lasting->not_separable;
+  const std::optional<Remark> doubt = lasting->not_separable;
   const double spread = student_quantile(0.5 + 0.5 * fit.config.level, fit.degrees_of_freedom);
   const std::string& name = lasting->parameter.name;
   if (drifting) hold_both_in_covariance(fit, *drifting, spread);
@@ -151,7 +151,7 @@ std::optional<DriftAnswers> give_both_drift_answers(FitResult& fit,
     ParameterResult& p = fit.parameters[i];
     const ParameterResult* other = drifting ? &drifting->parameters[i] : nullptr;
     if (p.parameter.name == name && other != nullptr) answers.drifting = other->estimate;
-    if (p.nuisance || !p.not_separable.empty()) continue;
+    if (p.nuisance || p.not_separable) continue;
     hold_both(p, other, doubt, fit.config.level, spread);
     fit.config.parameters[i].not_separable = p.not_separable;
   }
@@ -186,10 +186,8 @@ std::string drift_words(const DriftAnswers& answers, const FitResult& fit) {
   const FitParameter& k = lasting->parameter;
   std::string words = fmt::format(
       "{}: not separable, because no rest without a load determines the drift well enough: {} = {} "
-      "without "
-      "a "
-      "drift of the zero",
-      lasting->not_separable, k.name, in_sized_unit(*lasting, answers.k_inf));
+      "without a drift of the zero",
+      lasting->not_separable->text, k.name, in_sized_unit(*lasting, answers.k_inf));
   if (!answers.drifting) return words + "; no fit with one was found";
   const Unit& rate = answers.rate;
   std::string drifts;

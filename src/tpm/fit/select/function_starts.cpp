@@ -107,7 +107,7 @@ std::vector<std::vector<double>> nearest_compliances(const FitConfig& config,
   return starts;
 }
 
-/// A discrete spectrum: what is there at once or for ever, what flows, and weights at times.
+/// A discrete spectrum: the instantaneous and the equilibrium part, the flow, and weights at times.
 struct DiscreteSpectrum {
   double constant = 0.0;  ///< k_inf of G, or 1/k0 of J
   double flow = 0.0;      ///< 1/eta of J
@@ -217,7 +217,8 @@ std::vector<double> start_of_spectrum(const LawSpec& law, const FewReadings& rea
     prony = {s.constant, s.weight, s.time_s};
   } else {
     if (!bring_to(law.solid ? branches : branches - 1, s)) return {};
-    constexpr double kLeastShare = 1e-3;  // of the least compliance: a law has a stiffness at once
+    constexpr double kLeastShare =
+        1e-3;  // of the least compliance: a law has an instantaneous stiffness
     KelvinChain chain;
     chain.k0 = 1.0 / std::max(s.constant, kLeastShare * readings.value.minCoeff());
     for (const double weight : s.weight) chain.k.push_back(1.0 / weight);

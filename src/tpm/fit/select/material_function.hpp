@@ -37,8 +37,8 @@ struct MaterialFunction {
 [[nodiscard]] FitConfig function_config(LawSpec law, const MaterialFunction& function,
                                         const SetupOptions& options);
 
-/// What select_law() warns of a material function, for the fit of one data set: relaxation times
-/// outside what was measured, and what was assumed of small readings. Nothing of other data.
+/// The warnings of select_law() about a material function, for the fit of one data set: relaxation
+/// times outside what was measured, and what was assumed of small readings. Nothing of other data.
 [[nodiscard]] std::vector<Remark> function_remarks(const FitResult& fit, const DataSet& data);
 
 /// Fits every law and recommends the least, as select_law does for recordings; without held-out

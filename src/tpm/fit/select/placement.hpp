@@ -101,10 +101,10 @@ struct MeasuredPlacement {
   DriftFinding drift = DriftFinding::no_hold;
 };
 
-/// Whether a drift is told depends on the estimated noise. Rests whose noise seems small by chance
-/// tell it more often, so that the intervals of what is told would hold it too seldom (87 to 90 %
-/// where half of the recordings are told: reports/fits). Where the standard deviation at the upper
-/// end of the 95 % interval of the noise would not tell it, zero and drift have that one.
+/// The finding about a drift depends on the estimated noise. Rests whose noise seems small by
+/// chance tell it more often, so that the intervals of what is told would hold it too seldom (87 to
+/// 90 % where half of the recordings are told: reports/fits). Where the standard deviation at the
+/// upper end of the 95 % interval of the noise would not tell it, zero and drift have that one.
 [[nodiscard]] MeasuredPlacement measure_placement(const PreparedRecording& recording,
                                                   const LawSpec& law,
                                                   std::optional<double> exponent);

@@ -10,6 +10,7 @@
 #include "tpm/fit/likelihood/load_imposed.hpp"
 #include "tpm/fit/select/placement.hpp"
 #include "tpm/fit/select/unseen_rises.hpp"
+#include "tpm/fit/verdict.hpp"
 #include "tpmkit/error.hpp"
 
 namespace tpm::fit {
@@ -357,7 +358,7 @@ void add_placement(FitConfig& config, const LawModel& model,
   }
   if (held == 0 || told > 0) return;
   for (EstimatedParameter& p : config.parameters) {
-    if (p.fit.name == "k_inf") p.not_separable = "drift or a slow branch";
+    if (p.fit.name == "k_inf") p.not_separable = Remark{kDriftOrBranch, "drift or a slow branch"};
   }
 }
 

@@ -403,7 +403,7 @@ Json config_json(const FitConfig& config) {
                        {"begin", text(p.rise->begin_s, second)},
                        {"end", text(p.rise->end_s, second)}};
     }
-    if (!p.not_separable.empty()) entry["not_separable"] = p.not_separable;
+    if (p.not_separable) entry["not_separable"] = remark_json(*p.not_separable);
     parameters[p.fit.name] = std::move(entry);
   }
   j["parameters"] = std::move(parameters);

@@ -172,7 +172,7 @@ struct ProtocolSpans {
 /// note must not contradict its intervals.
 void reassess(Candidate& chosen, const ProtocolSpans& spans);
 
-/// What must be known of the recordings themselves: PreparedRecording::remarks, and depths in a
+/// Remarks about the recordings themselves: PreparedRecording::remarks, and depths in a
 /// unit that is not the file's.
 [[nodiscard]] std::vector<Remark> recording_remarks(std::span<const PreparedRecording> recordings);
 

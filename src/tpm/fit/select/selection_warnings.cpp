@@ -204,8 +204,8 @@ void doubt_plateau(FitResult& fit, const ProtocolSpans& spans) {
   if (seen) return;
   for (ParameterResult& p : fit.parameters) {
     const bool closed = p.verdict == Verdict::identified || p.verdict == Verdict::lower_only;
-    if (p.parameter.name != "k_inf" || !closed || !p.not_separable.empty()) continue;
-    p.not_separable = "the plateau or a slower branch";
+    if (p.parameter.name != "k_inf" || !closed || p.not_separable) continue;
+    p.not_separable = Remark{"plateau_or_slower_branch", "the plateau or a slower branch"};
     p.summary = parameter_words(p, fit.config.level);
   }
 }

@@ -7,6 +7,7 @@
 
 #include "tpm/base/sized_unit.hpp"
 #include "tpm/base/text.hpp"
+#include "tpm/fit/conditional.hpp"
 #include "tpm/fit/likelihood/load_imposed.hpp"
 
 namespace tpm::fit {
@@ -175,9 +176,10 @@ std::string contact_in_jump_words(const PreparedRecording& r, const FitConfig& c
     return sized_text(Dimension::length, r.recording.drive[i], 4);
   };
   const std::string start = depth(jump->before);
-  const bool searched = std::ranges::any_of(config.parameters, [](const EstimatedParameter& p) {
-    return p.fit.name.starts_with("contact");
-  });
+  bool searched = false;
+  for (std::size_t i = 0; i < config.parameters.size(); ++i) {
+    searched = searched || is_contact(config, i);
+  }
   return fmt::format(
       "{}: contact lies within a jump of the drive, from {} at {} s to {} at {} s, and no sample "
       "tells where: {}; --contact \"{}\" states that the probe touched before the jump",

@@ -22,9 +22,10 @@ std::string budget_row(const std::string& name, const std::string& largest,
 
 ShortAnswer short_answer(const ErrorBudget& b) {
   ShortAnswer answer;
-  answer.conclusion = {
-      fmt::format("{}: peak {}", b.title, sized_text(Dimension::force, b.peak_N, 4))};
-  answer.conclusion.insert(answer.conclusion.end(), b.sentences.begin(), b.sentences.end());
+  answer.conclusion = remark_texts(b.sentences);
+  answer.conclusion.insert(
+      answer.conclusion.begin(),
+      fmt::format("{}: peak {}", b.title, sized_text(Dimension::force, b.peak_N, 4)));
   answer.head = {budget_row("changed by, in parts of the peak", "largest", "rms")};
   for (const BudgetLine& line : b.lines) {
     answer.rows.push_back(budget_row(fmt::format("{} ({})", line.name, budget_kind_name(line.kind)),

@@ -86,7 +86,7 @@ Figure budget_figure(const ErrorBudget& budget) {
                       "added up at the "
                       "instant of their largest sum, and each line's own largest. {}.",
                       significant(budget.peak_N, 3),
-                      budget.sentences.empty() ? "" : budget.sentences.front()),
+                      budget.sentences.empty() ? "" : budget.sentences.front().text),
           {waterfall_panel(budget), largest_panel(budget)}};
 }
 

@@ -9,7 +9,7 @@
 namespace tpm::fit {
 
 Tone tone_of(const ParameterResult& p) {
-  if (!p.not_separable.empty() || p.unconfirmed) return Tone::bad;
+  if (p.not_separable || p.unconfirmed) return Tone::bad;
   switch (p.verdict) {
     case Verdict::identified:
       return Tone::good;

@@ -79,13 +79,13 @@ Json parameter_json(const ParameterResult& p, const EstimatedParameter& estimate
   if (limit) j["deviance_at_limit"] = rounded(*limit);
   j["at_bound"] = p.at_lower_bound ? "lower" : p.at_upper_bound ? "upper" : "no";
   j["verdict"] = verdict_text(p);
-  if (!p.not_separable.empty()) j["not_separable"] = p.not_separable;
+  if (p.not_separable) j["not_separable"] = remark_json(*p.not_separable);
   if (p.with_drift) {
     j["with_drift_SI"] = {
         {"estimate", rounded(p.with_drift->estimate)},
         {"interval", {or_null(p.with_drift->lower), or_null(p.with_drift->upper)}}};
   }
-  if (p.unconfirmed) j["unconfirmed"] = remarks_json({&*p.unconfirmed, 1}).front();
+  if (p.unconfirmed) j["unconfirmed"] = remark_json(*p.unconfirmed);
   if (estimated.prior) {
     j["prior_SI"] = {{"mean", rounded(estimated.prior->mean)},
                      {"sd", rounded(estimated.prior->sd)},

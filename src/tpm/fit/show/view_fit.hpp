@@ -8,7 +8,7 @@
 
 namespace tpm::fit {
 
-/// What of a fit a JSON document is.
+/// The kind of a JSON document that a fit has written.
 enum class FitFile { none, answer, law, figures };
 [[nodiscard]] FitFile fit_file(const Json& document);
 

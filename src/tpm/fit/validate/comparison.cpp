@@ -31,6 +31,8 @@ constexpr const char* kFilling = "the place of the spheres";
 RecordingComparison begun(const PreparedRecording& recording, const ComparisonOptions& options) {
   RecordingComparison begun;
   begun.name = recording.name;
+  begun.session = options.motion.session;
+  begun.press = options.motion.press;
   if (options.motion.knots.empty()) begun.rises = unseen_rises(recording);
   return begun;
 }

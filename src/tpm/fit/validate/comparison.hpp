@@ -30,7 +30,7 @@ struct QuantityComparison {
   ModelVerdict verdict = ModelVerdict::not_seen;
   double p_value = 1.0;   ///< before Holm
   bool rejected = false;  ///< beyond R (or 0) after Holm over the recording's quantities
-  /// What must shrink, or why there is no verdict.
+  /// The part of u_val that must shrink, or the reason why there is no verdict.
   std::optional<Remark> remark;
   bool unknown = false;  ///< a part of u_val is not known: the remark says which
   /// Root of the covariance of what recordings of one calibration share (law, common instrument):
@@ -71,7 +71,8 @@ struct Applicability {
 
 struct RecordingComparison {
   std::string name, sha256;
-  bool calibration = false;  ///< the law was fitted to these data
+  std::string session, press;  ///< of which the name consists; empty: no press of a session
+  bool calibration = false;    ///< the law was fitted to these data
   RecordingParts parts;
   ComparedPart part;
   ReadingScatter scatter;
@@ -114,6 +115,7 @@ struct SessionMotion {
   std::vector<Knot> knots;
   /// When the hand was asked to hold, of the recording's clock; none: it was not.
   std::optional<double> hold_asked_s;
+  std::string session = {}, press = {};  ///< names of the file and of the phase
 };
 
 struct ComparisonOptions {

@@ -56,7 +56,7 @@ class LawAlong {
   /// Of an organ: its answer, and those of other fillings of its body. Bonds are fitted to the law
   /// at the places of their spheres, so each of the others has one factor on its moduli with which
   /// it comes nearest to the organ, in least squares, along the motion at the depth of the
-  /// calibration. Empty if one of them gives way.
+  /// calibration. Empty if one of them has no equilibrium.
   [[nodiscard]] std::vector<Eigen::VectorXd> by_filling(const OtherFillings& others,
                                                         double contact) const;
 

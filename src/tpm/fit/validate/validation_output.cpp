@@ -144,11 +144,6 @@ std::string scatter_text(const ReadingScatter& s, const Unit& unit) {
       s.told_by);
 }
 
-/// Who answers, where it is no law and no network.
-std::string answer_text(const RecordingComparison& r) {
-  return fmt::format("{}, which a plan picked; its claimed error is in u_num as a limit", r.pick);
-}
-
 std::string rendering_text(const Validation& v) {
   std::string text = fmt::format("{}: S is times", v.session);
   for (const RenderingError& e : v.rendering) {
@@ -219,16 +214,12 @@ struct RecordingNames {
 };
 
 RecordingNames names_of(const Validation& v) {
-  RecordingNames all{{}, mapped<std::string>(v.recordings, &RecordingComparison::name)};
-  const std::size_t colon = all.names.front().find(": ");
-  if (all.names.size() < 2 || !v.of_session() || colon == std::string::npos) return all;
-  const std::string file = all.names.front().substr(0, colon + 2);
-  for (const std::string& name : all.names) {
-    if (!name.starts_with(file)) return all;
-  }
-  all.file = file;
-  for (std::string& name : all.names) name.erase(0, file.size());
-  return all;
+  const std::string& session = v.recordings.front().session;
+  const bool shared =
+      v.recordings.size() > 1 && !session.empty() &&
+      std::ranges::all_of(v.recordings, [&](const auto& r) { return r.session == session; });
+  if (!shared) return {{}, mapped<std::string>(v.recordings, &RecordingComparison::name)};
+  return {session + ": ", mapped<std::string>(v.recordings, &RecordingComparison::press)};
 }
 
 void add_header(BriefText& text, const Validation& v) {
@@ -285,7 +276,11 @@ void add_recording(BriefText& text, const Validation& v, std::size_t index) {
       "whole curve",
       curve_text(r.curve, unit) + (v.new_specimen ? " (without the spread between specimens)" : ""),
       Rank::detail);
-  if (!r.pick.empty()) text.add_line("S from", answer_text(r), Rank::context);
+  if (!r.pick.empty()) {
+    text.add_line("S from",
+                  r.pick + ", which a plan picked; its claimed error is in u_num as a limit",
+                  Rank::context);
+  }
   text.add_line(
       "placement",
       placement_text(r, unit, quantity_dimension(r.creep ? v.spec.response : v.spec.drive)),

@@ -27,6 +27,15 @@ std::filesystem::path shipped_folder() {
   return share_dir() / "configs" / "devices";
 }
 
+/// Measured numbers of a file take the place of those of its kind.
+DeviceLimits with_measured(DeviceLimits limits, const DeviceFile& file) {
+  if (file.encoder_step_m) limits.encoder_step_m = *file.encoder_step_m;
+  limits.measured_delay_s = file.measured_delay_s;
+  limits.measured_friction_N_s_per_m = file.measured_friction_N_s_per_m;
+  limits.measured_period_s = file.measured_period_s;
+  return limits;
+}
+
 bool is_plain_name(std::string_view kind) {
   return !kind.empty() && std::all_of(kind.begin(), kind.end(), [](char c) {
     return (c >= 'a' && c <= 'z') || (c >= '0' && c <= '9') || c == '_';
@@ -111,11 +120,7 @@ DeviceLimits limits_in(const DeviceFile& file) {
   limits.friction_N_s_per_m = file.friction_N_s_per_m.value_or(0.0);
   limits.delay_periods = 1;
   limits.provenance = file.provenance;
-  if (file.encoder_step_m) limits.encoder_step_m = *file.encoder_step_m;
-  limits.measured_delay_s = file.measured_delay_s;
-  limits.measured_friction_N_s_per_m = file.measured_friction_N_s_per_m;
-  limits.measured_period_s = file.measured_period_s;
-  return limits;
+  return with_measured(limits, file);
 }
 
 DeviceLimits limits_from(const DeviceFile& file, std::string_view kind) {
@@ -173,11 +178,7 @@ DeviceLimits limits_by_file(DeviceLimits limits, const DeviceFile& file) {
     limits.least_ramp_in_s = *file.least_ramp_in_s;
     say("least_ramp_in_s");
   }
-  if (file.encoder_step_m) limits.encoder_step_m = *file.encoder_step_m;
-  limits.measured_delay_s = file.measured_delay_s;
-  limits.measured_friction_N_s_per_m = file.measured_friction_N_s_per_m;
-  limits.measured_period_s = file.measured_period_s;
-  return limits;
+  return with_measured(limits, file);
 }
 
 }  // namespace tpm::haptics

@@ -207,12 +207,14 @@ void ForceDimension::identify() {
   identity_.hardware = !seen.simulated;
   gripper_ = call_.has_gripper != nullptr && call_.has_gripper(id_);
   if (!limits_.tried) {
-    identity_.assumptions.push_back(fmt::format(
-        "never tried with {}: it is taken to have at least the force, workspace and stability of "
-        "{} N, {} mm and {} N/m",
-        limits_.name, limits_.force_N, 1e3 * limits_.reach_m, limits_.stiffness_N_per_m));
+    identity_.assumptions.push_back(
+        {"never_tried",
+         fmt::format("never tried with {}: it is taken to have at least the force, workspace and "
+                     "stability of {} N, {} mm and {} N/m",
+                     limits_.name, limits_.force_N, 1e3 * limits_.reach_m,
+                     limits_.stiffness_N_per_m)});
     for (const auto& [limit, source] : limits_.provenance) {
-      identity_.assumptions.push_back(fmt::format("{}: {}", limit, source));
+      identity_.assumptions.push_back({"limit_source", fmt::format("{}: {}", limit, source)});
     }
   }
 }

@@ -210,13 +210,17 @@ PluginDevice::PluginDevice(const std::filesystem::path& file, const DeviceSelect
   identity_.library_version = plugin_->name();
   identity_.link = description_.hardware != 0 ? DeviceLink::unknown : DeviceLink::none;
   identity_.hardware = description_.hardware != 0;
-  identity_.assumptions.emplace_back(
-      "a device of a plugin: its limits, its friction and whether it is hardware are what the "
-      "plugin says");
+  identity_.assumptions.push_back(
+      {"device_of_plugin",
+       "a device of a plugin: its limits, its friction and whether it is hardware are what the "
+       "plugin says"});
   const std::string told = text_of(description_.assumptions);
   for (std::size_t at = 0; at < told.size();) {
     const std::size_t end = std::min(told.find('\n', at), told.size());
-    if (end > at) identity_.assumptions.push_back(printable(told.substr(at, end - at), 200));
+    if (end > at) {
+      identity_.assumptions.push_back(
+          {"stated_by_plugin", printable(told.substr(at, end - at), 200)});
+    }
     at = end + 1;
   }
 }

@@ -9,7 +9,8 @@ ReplayDevice::ReplayDevice(Eigen::Matrix3Xd position_m, const std::string& sourc
   if (position_m_.cols() == 0) throw bad_input(source, "holds no motion", "a recorded session");
   identity_.kind = "replay";
   identity_.name = "recorded motion of " + source;
-  identity_.assumptions = {"the motion is a recording: it does not answer to the forces"};
+  identity_.assumptions = {
+      {"recorded_motion", "the motion is a recording: it does not answer to the forces"}};
 }
 
 const DeviceIdentity& ReplayDevice::open() {

@@ -31,29 +31,35 @@ Eigen::Matrix<double, 2, 3> place_propagator(const PlantSettings& settings) {
   return propagator(settings, settings.arm.stiffness_N_per_m);
 }
 
-std::vector<std::string> assumptions_of(const PlantSettings& s) {
-  std::vector<std::string> assumptions{
-      line_of("moving mass %g kg (assumed; 0.2 to 0.4 is usual)", s.mass_kg),
-      line_of("viscous friction %g N s/m (assumed; 0.1 to 1 is usual)", s.damping_N_s_per_m),
-      line_of("encoder step %g m (assumed; the Omega.7's data sheet says below 1e-5)",
-              s.encoder_step_m),
-      line_of("delay from command to force %g s (assumed)", s.delay_periods * s.period_s),
-      line_of("forces cut above %g m/s (assumed)", s.velocity_limit_m_per_s),
-      "arm of the operator: " + line_of("%g kg, ", s.arm.mass_kg) +
-          line_of("%g N s/m, ", s.arm.damping_N_s_per_m) +
-          line_of("%g N/m (one published fit)", s.arm.stiffness_N_per_m),
-      line_of("eye of the operator: a wrong depth is corrected at %g a second (assumed)",
-              s.arm.correction_per_s),
+std::vector<Remark> assumptions_of(const PlantSettings& s) {
+  std::vector<Remark> assumptions{
+      {"moving_mass", line_of("moving mass %g kg (assumed; 0.2 to 0.4 is usual)", s.mass_kg)},
+      {"viscous_friction",
+       line_of("viscous friction %g N s/m (assumed; 0.1 to 1 is usual)", s.damping_N_s_per_m)},
+      {"encoder_step",
+       line_of("encoder step %g m (assumed; the Omega.7's data sheet says below 1e-5)",
+               s.encoder_step_m)},
+      {"force_delay",
+       line_of("delay from command to force %g s (assumed)", s.delay_periods * s.period_s)},
+      {"speed_limit", line_of("forces cut above %g m/s (assumed)", s.velocity_limit_m_per_s)},
+      {"operator_arm", "arm of the operator: " + line_of("%g kg, ", s.arm.mass_kg) +
+                           line_of("%g N s/m, ", s.arm.damping_N_s_per_m) +
+                           line_of("%g N/m (one published fit)", s.arm.stiffness_N_per_m)},
+      {"operator_eye",
+       line_of("eye of the operator: a wrong depth is corrected at %g a second (assumed)",
+               s.arm.correction_per_s)},
   };
   if (s.workspace) {
     assumptions.push_back(
-        line_of("stop at the end of the workspace, a cylinder about x of %g m ",
-                2.0 * s.workspace->radius_m) +
-        line_of("diameter and %g m length (assumed)", 2.0 * s.workspace->half_length_m));
+        {"workspace_stop",
+         line_of("stop at the end of the workspace, a cylinder about x of %g m ",
+                 2.0 * s.workspace->radius_m) +
+             line_of("diameter and %g m length (assumed)", 2.0 * s.workspace->half_length_m)});
   }
   if (s.least_watchdog_s > 0.0)
     assumptions.push_back(
-        line_of("a watchdog that waits %g s at least, which no Omega.7 does", s.least_watchdog_s));
+        {"least_watchdog", line_of("a watchdog that waits %g s at least, which no Omega.7 does",
+                                   s.least_watchdog_s)});
   return assumptions;
 }
 

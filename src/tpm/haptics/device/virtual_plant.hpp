@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "tpm/haptics/device/operator_script.hpp"
+#include "tpmkit/error.hpp"
 
 namespace tpm::haptics {
 
@@ -47,7 +48,7 @@ struct PlantSettings {
 };
 
 /// Assumptions among the settings, one line each.
-[[nodiscard]] std::vector<std::string> assumptions_of(const PlantSettings& settings);
+[[nodiscard]] std::vector<Remark> assumptions_of(const PlantSettings& settings);
 
 /// Motion of device and arm in a period around the place that the hand holds: distance and speed
 /// from distance, speed and a constant force, exactly.

@@ -30,19 +30,13 @@ std::string devices_there(const InverseInventory& inventory) {
              : fmt::format("{} device{}: {}", count, count == 1 ? "" : "s", fmt::join(ids, ", "));
 }
 
-/// Without what was expected.
-std::string reason_of(const Error& error) {
-  const std::string_view all = error.what();
-  return std::string(all.substr(0, all.find("; expected")));
-}
-
 /// Throws Error(environment) with the port.
 InverseInventory inventory_from(const std::string& text, int port) {
   try {
     return parse_inventory(text);
   } catch (const Error& error) {
     throw service_fault(
-        fmt::format("127.0.0.1:{}: the inventory cannot be read: {}", port, reason_of(error)),
+        fmt::format("127.0.0.1:{}: the inventory cannot be read: {}", port, error.reason()),
         "a service that is compatible with the Inverse service");
   }
 }
@@ -52,7 +46,7 @@ std::unique_ptr<WebSocketClient> events_of(const InverseAddress& address) {
     return std::make_unique<WebSocketClient>(address.events_port, "/", kPatience_s,
                                              kMostMessageBytes);
   } catch (const Error& error) {
-    throw service_fault(fmt::format("no events are heard: {}", reason_of(error)),
+    throw service_fault(fmt::format("no events are heard: {}", error.reason()),
                         "the events port of the service: --inverse-events-port");
   }
 }
@@ -292,14 +286,18 @@ void InverseDevice::identify() {
   identity_.hardware = !device_.simulated;
   identity_.assumptions = device_.settings.lines();
   if (events_ == nullptr) {
-    identity_.assumptions.push_back("events of the service are not heard: its version has none");
+    identity_.assumptions.push_back(
+        {"events_not_heard", "events of the service are not heard: its version has none"});
   }
-  identity_.assumptions.push_back(
+  const auto add = [&](const char* code, std::string text) {
+    identity_.assumptions.push_back({code, std::move(text)});
+  };
+  add("limit_force",
       fmt::format("at most {} N ({})", limits_.force_N, limits_.known_by("force_N")));
-  identity_.assumptions.push_back(fmt::format("{} mm from the middle of the workspace ({})",
-                                              1e3 * limits_.reach_m, limits_.known_by("reach_m")));
-  identity_.assumptions.push_back(fmt::format("at most {} N/m ({})", limits_.stiffness_N_per_m,
-                                              limits_.known_by("stiffness_N_per_m")));
+  add("limit_workspace", fmt::format("{} mm from the middle of the workspace ({})",
+                                     1e3 * limits_.reach_m, limits_.known_by("reach_m")));
+  add("limit_stiffness", fmt::format("at most {} N/m ({})", limits_.stiffness_N_per_m,
+                                     limits_.known_by("stiffness_N_per_m")));
 }
 
 const DeviceIdentity& InverseDevice::open() {

@@ -247,27 +247,31 @@ bool InverseSettings::true_to_scale() const {
   return mount_scale.isApprox(Eigen::Vector3d::Ones(), 1e-9);
 }
 
-std::vector<std::string> InverseSettings::lines() const {
+std::vector<Remark> InverseSettings::lines() const {
   const auto triple = [](const Eigen::Vector3d& v) {
     return fmt::format("{} {} {}", v.x(), v.y(), v.z());
   };
   return {
-      fmt::format("the service says: force gate {}",
-                  filters_named ? fmt::format("{}", force_gate_gain) : "not named"),
-      damping_named ? fmt::format("the service says: damping {}, by direction {}", damping,
-                                  triple(directional_damping))
-                    : "the service says: damping not named",
-      fmt::format("the service says: preset '{}', basis {}", preset, basis),
-      fmt::format(
-          "the service says: mount at {} m, turned by {} rad, scale {}", triple(mount_position_m),
-          mount_rotation.angularDistance(Eigen::Quaterniond::Identity()), triple(mount_scale)),
-      fmt::format("the service says: gravity compensation {}; torque scaling {}",
-                  gravity_named ? fmt::format("{}, factor {}", gravity_compensation ? "on" : "off",
-                                              gravity_scaling)
-                                : "not named",
-                  !torque_scaling   ? "not named"
-                  : *torque_scaling ? "on"
-                                    : "off")};
+      {"service_force_gate",
+       fmt::format("the service says: force gate {}",
+                   filters_named ? fmt::format("{}", force_gate_gain) : "not named")},
+      {"service_damping", damping_named
+                              ? fmt::format("the service says: damping {}, by direction {}",
+                                            damping, triple(directional_damping))
+                              : "the service says: damping not named"},
+      {"service_preset", fmt::format("the service says: preset '{}', basis {}", preset, basis)},
+      {"service_mount", fmt::format("the service says: mount at {} m, turned by {} rad, scale {}",
+                                    triple(mount_position_m),
+                                    mount_rotation.angularDistance(Eigen::Quaterniond::Identity()),
+                                    triple(mount_scale))},
+      {"service_gravity",
+       fmt::format("the service says: gravity compensation {}; torque scaling {}",
+                   gravity_named ? fmt::format("{}, factor {}", gravity_compensation ? "on" : "off",
+                                               gravity_scaling)
+                                 : "not named",
+                   !torque_scaling   ? "not named"
+                   : *torque_scaling ? "on"
+                                     : "off")}};
 }
 
 InverseInventory parse_inventory(std::string_view text) {

@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "tpm/base/namespaces.hpp"
+#include "tpmkit/error.hpp"
 
 namespace tpm::haptics {
 
@@ -55,7 +56,7 @@ struct InverseSettings {
   /// Share of the device's weight that the service carries.
   [[nodiscard]] double carried() const { return gravity_compensation ? gravity_scaling : 0.0; }
   /// One line for each thing that a recording names.
-  [[nodiscard]] std::vector<std::string> lines() const;
+  [[nodiscard]] std::vector<Remark> lines() const;
 };
 
 struct InverseState {

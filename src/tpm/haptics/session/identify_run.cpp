@@ -12,6 +12,7 @@
 #include "tpm/base/text.hpp"
 #include "tpm/haptics/device/device_keys.hpp"
 #include "tpm/haptics/device/forces_off_guard.hpp"
+#include "tpm/haptics/loop/empty_space.hpp"
 #include "tpm/haptics/loop/real_time.hpp"
 #include "tpmkit/error.hpp"
 #include "tpmkit/version.hpp"
@@ -29,11 +30,11 @@ constexpr double kComesBack_s = 2.0;
 constexpr double kLeastStart_m = 0.005;  ///< radius of the places in which a handle may begin
 
 /// Answers with the forces of the identification, whatever the motion.
-class IdentifyingModel final : public ContactModel {
+class IdentifyingModel final : public EmptySpace {
  public:
   IdentifyingModel(const Eigen::Vector3d& push, double period_s, std::uint64_t seed)
-      : push_(push), period_s_(period_s), seed_(seed), force_(period_s, seed) {}
-  void reset() noexcept override { force_ = IdentifyingForce(period_s_, seed_); }
+      : EmptySpace(period_s), push_(push), seed_(seed), force_(period_s, seed) {}
+  void reset() noexcept override { force_ = IdentifyingForce(period_s(), seed_); }
   ContactAnswer step(const ToolPose& tool) noexcept override {
     const double at_m = push_.dot(tool.displacement_m);
     const double force_N = force_.next_N(at_m);
@@ -42,17 +43,9 @@ class IdentifyingModel final : public ContactModel {
                                                        : Eigen::Vector3d(force_N * push_);
     return answer;
   }
-  [[nodiscard]] double period_s() const noexcept override { return period_s_; }
-  [[nodiscard]] Eigen::Matrix3d instantaneous_stiffness() const noexcept override {
-    return Eigen::Matrix3d::Identity();
-  }
-  [[nodiscard]] Eigen::Matrix3d equilibrium_stiffness() const noexcept override {
-    return Eigen::Matrix3d::Identity();
-  }
 
  private:
   Eigen::Vector3d push_;
-  double period_s_;
   std::uint64_t seed_;
   IdentifyingForce force_;
 };

@@ -109,7 +109,7 @@ Json to_json(const DeviceIdentity& device) {
           {"communication_mode", to_string(device.link)},
           {"left_handed", device.left_handed},
           {"hardware", device.hardware},
-          {"assumptions", device.assumptions}};
+          {"assumptions", remarks_json(device.assumptions)}};
 }
 
 Json recording_header(const HilSession& session, const DeviceIdentity& device,

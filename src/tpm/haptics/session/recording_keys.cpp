@@ -29,6 +29,17 @@ Key<T> text_key(const char* name, std::string T::*member, const char* sentence) 
   return key(name, member, text(), sentence);
 }
 
+/// Recordings of an earlier tpm have the text alone.
+ValueType<Remark> remark_or_text() {
+  const ValueType<Remark> type = remark();
+  return {
+      either_form({type.form, text().form}),
+      [read = type.read](const Json& value, const DocumentPlace& place) {
+        return value.is_string() ? Remark{"uncoded", value.get<std::string>()} : read(value, place);
+      },
+      type.write};
+}
+
 const Block<RecordedDevice>& recorded_device_block() {
   using D = RecordedDevice;
   static const Block<D> block(
@@ -41,7 +52,7 @@ const Block<RecordedDevice>& recorded_device_block() {
        required(text_key("communication_mode", &D::communication_mode, "how it is connected")),
        unread<D>("left_handed", flag().form, "its configuration"),
        unread<D>("hardware", flag().form, "no simulated device"),
-       required(key("assumptions", &D::assumptions, list(text()),
+       required(key("assumptions", &D::assumptions, list(remark_or_text()),
                     "what was assumed of a simulated device"))});
   return block;
 }

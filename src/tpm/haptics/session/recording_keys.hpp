@@ -21,7 +21,7 @@ struct SessionNotes {
 
 struct RecordedDevice {
   std::string kind, name, serial, firmware, library_version, communication_mode;
-  std::vector<std::string> assumptions;
+  std::vector<Remark> assumptions;
 };
 
 struct RecordedModel {

@@ -78,7 +78,7 @@ struct RenderingCheck {
   [[nodiscard]] std::string verdict() const;
 };
 
-/// What to change so that a condition is met.
+/// The change with which a condition is met.
 [[nodiscard]] std::string_view remedy(RenderingCondition condition);
 
 /// The stiffness is that of the model's own steps: pushed to four depths up to the session's

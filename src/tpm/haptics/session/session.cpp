@@ -21,17 +21,6 @@
 namespace tpm::haptics {
 namespace {
 
-/// A session that follows its declaration. Throws Error(bad_input) otherwise.
-Json checked_session(const Json& json, std::string_view where) {
-  if (json.is_object() && json.contains("model") && json["model"].is_object() &&
-      json["model"].value("kind", Json()) == "network_beside") {
-    throw bad_input(DocumentPlace{std::string(where)}.key("model").key("kind").where,
-                    "'network_beside' was removed, it could add energy",
-                    "planned, condensed (its step does not grow with the organ) or network");
-  }
-  return checked(json, session_kind(), where);
-}
-
 /// The part of a direction that is square to the push.
 Eigen::Vector3d slide_of(const SlideKeys& slides, const Eigen::Vector3d& push,
                          const DocumentPlace& place) {
@@ -279,7 +268,7 @@ OperatorScript HilSession::operator_script() const {
 
 HilSession parse_session(const Json& written, std::string_view where,
                          const std::filesystem::path& folder, const DeviceLimits& device) {
-  const Json json = checked_session(written, where);
+  const Json json = checked(written, session_kind(), where);
   const DocumentPlace place{std::string(where)};
   SessionKeys keys = session_block().made(json, place);
   HilSession session;
@@ -382,7 +371,7 @@ HilSession on_device(HilSession session, const DeviceLimits& limits) {
 
 HilSession read_session(const std::filesystem::path& file, const SessionChanges& changes,
                         const DeviceLimits& device) {
-  Json json = checked_session(read_json(file), file.string());
+  Json json = checked(read_json(file), session_kind(), file.string());
   if (!changes.law.empty()) {
     json["model"] = {{"kind", "law"}, {"law", files::to_json(read_law(changes.law))}};
   }

@@ -258,7 +258,7 @@ Json boundary_json(const BoundaryStudy& study) {
                 {"predicted_N_s_per_m", or_null(p.predicted_N_s_per_m)}};
   });
   return {{"simulated_device", true},
-          {"assumptions", assumptions_of(study.plant)},
+          {"assumptions", remarks_json(assumptions_of(study.plant))},
           {"relaxation_time_s", rounded(study.relaxation_time_s)},
           {"stiffness_N_per_m", rounded(study.stiffness_N_per_m)},
           {"passive", points_json(study.passive, "measured_N_per_m", "predicted_N_per_m")},

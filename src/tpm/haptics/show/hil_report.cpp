@@ -209,7 +209,7 @@ void add_identity(Document& d, const HilRecording& r) {
   d.heading(2, "Device and model");
   d.table(std::move(table));
   std::vector<Cell> assumed;
-  for (const std::string& line : device.assumptions) assumed.push_back({line});
+  for (const Remark& assumption : device.assumptions) assumed.push_back({assumption.text});
   if (!assumed.empty()) d.bullets(std::move(assumed));
 }
 

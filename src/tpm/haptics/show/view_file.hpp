@@ -28,7 +28,7 @@ struct FolderResults {
 /// anyway, its law and figures, is no result of its own. A damaged file is not shown.
 [[nodiscard]] FolderResults results_in(const std::filesystem::path& folder);
 
-/// What is shown of a path.
+/// The page of a path.
 struct Viewed {
   std::vector<std::filesystem::path> files;
   std::vector<ViewPage> pages;  ///< of these files

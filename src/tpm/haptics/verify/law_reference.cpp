@@ -67,7 +67,7 @@ std::vector<double> law_forces_by_gauss(const LawFile& file, std::span<const dou
   for (std::size_t i = 0; i < time_s.size(); ++i) {
     const double h = i == 0 ? 0.0 : time_s[i] - time_s[i - 1];
     const double tool = depth_m[i];
-    if (h == 0.0) {  // the first instant: from rest, at once
+    if (h == 0.0) {  // the first instant: from rest, instantaneously
       surface = std::max(tool, 0.0);
       y.setConstant(law.kernel.value(surface));
       touching = tool >= 0.0;

@@ -73,7 +73,10 @@ class PressReader {
     const auto begin = std::find_if(rows_.begin(), rows_.end(), in_press);
     const auto end = std::find_if_not(begin, rows_.end(), in_press);
     const auto count = static_cast<std::size_t>(end - begin);
-    const std::string name = fmt::format("{}: {}", recording_.name, session_.phases[of.first].name);
+    SessionPress press;
+    press.motion.session = recording_.name;
+    press.motion.press = session_.phases[of.first].name;
+    const std::string name = fmt::format("{}: {}", press.motion.session, press.motion.press);
     constexpr double kWhole = 0.98;  // of its time
     const double asked_s = session_.phases[of.last].end_s - begin_s(of.first);
     const double made_s = static_cast<double>(count) * session_.servo.period_s;
@@ -93,7 +96,6 @@ class PressReader {
       r.response.push_back(recording_.commanded_N(**row));
       if (static_cast<std::size_t>(end - row) <= stride) break;
     }
-    SessionPress press;
     const auto add_knot = [&](const ServoRecord& row) {
       press.motion.knots.push_back({recording_.time_s(row), depth_of(row)});
     };

@@ -13,7 +13,6 @@
 #include "tpmkit/error.hpp"
 
 namespace tpm {
-using namespace base;
 using namespace law;
 
 Response Model::respond_along(const Protocol& protocol, std::span<const double> times_s,

@@ -19,7 +19,7 @@ class InertialIntegration {
 
   /// Begins a piece that ends at `stop_s`, from the state reached.
   void restart(double time_s, double stop_s);
-  /// What ends a step.
+  /// Reason for the end of a step.
   enum class Reached { within, target, meeting };
   /// One step, at most up to `time_s`, which tools may not step over: to the first time at which
   /// one meets a sphere. Throws Error(numerical) with the time where CVODES gives up.

@@ -164,8 +164,8 @@ class Run {
     return spent;
   }
 
-  /// Goes to an imposed value through equilibria, at once or with everything relaxed on the way.
-  /// Such a move is reversible: the work is what is stored.
+  /// Goes to an imposed value through equilibria, instantaneously or with everything relaxed on the
+  /// way. Such a move is reversible: the work is what is stored.
   void move_to(double value, bool relaxed) {
     const double before_J = stored_J(state_);
     follow(value, relaxed);

@@ -35,7 +35,7 @@ class Recorder {
 
   /// Where spheres have mass: takes a step of the integrator, to find extremes between those times.
   void follow(const QuasiStaticState& step, const Eigen::VectorXd& contact_push_N);
-  /// What is followed from now on is not smooth with what was.
+  /// Marks a discontinuity: values from now on are not smooth with those before.
   void corner();
 
   /// Ends a part at the state last seen; now and then writes a checkpoint.

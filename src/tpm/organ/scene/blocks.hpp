@@ -168,7 +168,4 @@ struct AnchorBlock {
 [[nodiscard]] std::size_t sphere_of(std::size_t number, const Organ& organ,
                                     const DocumentPlace& place);
 
-/// Three lengths such as ["2 mm", "0 mm", "1 cm"], m.
-[[nodiscard]] Eigen::Vector3d parse_point(const Json& list, const DocumentPlace& place);
-
 }  // namespace tpm::organ

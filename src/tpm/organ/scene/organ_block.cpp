@@ -393,10 +393,6 @@ std::size_t sphere_of(std::size_t number, const Organ& organ, const DocumentPlac
                   fmt::format("1 to {}", organ.size()));
 }
 
-Eigen::Vector3d parse_point(const Json& list, const DocumentPlace& place) {
-  return vector_of(point_type().read(list, place));
-}
-
 OrganBlock organ_of(const OrganKeys& block, const DocumentPlace& place, const fs::path& folder) {
   OrganBlock result;
   result.organ = spheres_of(block, place, folder);

@@ -23,7 +23,7 @@ class ClaimReader {
   [[nodiscard]] const std::string& at() const noexcept { return at_; }
 
   [[nodiscard]] const Claim* operator->() const noexcept { return &claim_; }
-  /// What this kind of claim needs; Error(bad_input) with the key if it is missing.
+  /// A key that this kind of claim needs; Error(bad_input) with the key if it is missing.
   template <class V>
   [[nodiscard]] const V& needed(std::optional<V> Claim::*member) const {
     if (const std::optional<V>& value = claim_.*member) return *value;

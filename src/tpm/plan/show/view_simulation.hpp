@@ -10,7 +10,7 @@
 
 namespace tpm::plan {
 
-/// What an HDF5 file is that is no result of `tpm simulate`, and what shows it instead; none for a
+/// The kind of an HDF5 file that is no result of `tpm simulate`, and its viewer; none for a
 /// result.
 [[nodiscard]] std::optional<OtherKind> other_than_simulation(const Hdf5Reader& file,
                                                              const std::filesystem::path& path);
