@@ -70,7 +70,7 @@ TEST_CASE("A service is opened in both formats, made neutral, and what it says i
   }
 }
 
-TEST_CASE("A service that is not what it should be is refused with the reason") {
+TEST_CASE("A service that is not what it should be is refused with the reason", "[untimed]") {
   StandInFaults f;
   f.keeps = {"force_gate"};
   CHECK_THAT(refusal(f), Contains("force gate of the service stays at 0.3"));
@@ -139,7 +139,7 @@ DevicePreparation in_real_time(double watchdog_s) {
   return preparation;
 }
 
-TEST_CASE("The first position is one of now, not one that was waiting") {
+TEST_CASE("The first position is one of now, not one that was waiting", "[untimed]") {
   StandInFaults f;
   f.unasked_states = 3;
   StandInInverse service(PlantSettings{}, {}, false, f);
@@ -218,7 +218,7 @@ TEST_CASE("A device that keeps the clock has no virtual time") {
 }
 
 TEST_CASE("Delays of 0, 2 and 5 ms are found, and the session is verified as any other",
-          "[heavy]") {
+          "[heavy][untimed]") {
   const test::TempFolder folder;
   for (const int late_ms : {0, 2, 5}) {
     const HilSession session = test::parsed(inverse_session());
@@ -272,7 +272,7 @@ TEST_CASE("Delays of 0, 2 and 5 ms are found, and the session is verified as any
   }
 }
 
-TEST_CASE("A measurement goes on after a lost connection, and says so") {
+TEST_CASE("A measurement goes on after a lost connection, and says so", "[untimed]") {
   const HilSession session = test::parsed(inverse_session());
   constexpr int kLate_ms = 2;
   PlantSettings free = plant_of(session, kLate_ms);
@@ -343,7 +343,7 @@ SessionRun run_on(const StandInFaults& faults,
   return run;
 }
 
-TEST_CASE("Each way in which a service fails ends the session with its cause") {
+TEST_CASE("Each way in which a service fails ends the session with its cause", "[untimed]") {
   struct Case {
     How how;
     StopCause cause;
@@ -363,7 +363,7 @@ TEST_CASE("Each way in which a service fails ends the session with its cause") {
   }
 }
 
-TEST_CASE("A workspace that is scaled, turned or moved during a session ends it") {
+TEST_CASE("A workspace that is scaled, turned or moved during a session ends it", "[untimed]") {
   for (const char* transform : {R"({"scale":{"x":10,"y":10,"z":10}})",
                                 R"({"rotation":{"w":0.7071,"x":0.7071,"y":0,"z":0}})",
                                 R"({"position":{"x":0.05,"y":0,"z":0}})"}) {
@@ -395,7 +395,7 @@ TEST_CASE("A workspace that is scaled, turned or moved during a session ends it"
   CHECK(run_on(elsewhere).outcome.cause == StopCause::finished);
 }
 
-TEST_CASE("Events of the service end a session with their words") {
+TEST_CASE("Events of the service end a session with their words", "[untimed]") {
   struct Case {
     InverseEvent event;
     StopCause cause;

@@ -125,7 +125,7 @@ TEST_CASE("Findings and a cut of the forces come from other threads while loop a
   }
 }
 
-TEST_CASE("States that list the device no more end a session with these words") {
+TEST_CASE("States that list the device no more end a session with these words", "[untimed]") {
   StandInFaults f;
   f.version = "3.1.0.0";
   f.from = 5;
@@ -137,7 +137,7 @@ TEST_CASE("States that list the device no more end a session with these words") 
   CHECK_THAT(status_after_end(f, false).error_text, !Contains("listed"));
 }
 
-TEST_CASE("A service that falls silent while it is opened is quoted with its event") {
+TEST_CASE("A service that falls silent while it is opened is quoted with its event", "[untimed]") {
   StandInFaults f;
   f.answers = 0;
   StandInInverse service(PlantSettings{}, {}, false, f);

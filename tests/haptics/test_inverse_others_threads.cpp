@@ -26,7 +26,8 @@ using namespace test::inverse_sessions;
 using test::StandInFaults;
 using test::StandInInverse;
 
-TEST_CASE("A device is chosen by its id or place; a wrong one is refused with those there are") {
+TEST_CASE("A device is chosen by its id or place; a wrong one is refused with those there are",
+          "[untimed]") {
   StandInFaults f;
   f.devices = {"049D", "0A14"};
   CHECK_THAT(refusal(f), Contains("the service has 2 devices: 049D, 0A14; expected --serial with "
@@ -50,7 +51,8 @@ TEST_CASE("A device is chosen by its id or place; a wrong one is refused with th
   CHECK_THAT(refusal(f, "0A14"), Contains("the service has 1 device: 049D"));
 }
 
-TEST_CASE("A simulated device that another client drives is refused, hardware is named") {
+TEST_CASE("A simulated device that another client drives is refused, hardware is named",
+          "[untimed]") {
   StandInFaults f;
   f.in_use = true;
   CHECK_THAT(refusal(f), Contains("another client drives the device 049D (status in_use); expected "
@@ -86,7 +88,8 @@ struct ServedBeside {
 const std::string kPushOfOne = force_message(InverseFormat::vector, "SIMULATED", {0.0, 0.0, 1.0});
 
 TEST_CASE(
-    "A session on tpm hil serve waits for another client to leave, and refuses one that stays") {
+    "A session on tpm hil serve waits for another client to leave, and refuses one that stays",
+    "[untimed]") {
   const ServedBeside served;
   auto first = test::client_of(*served.server);
   std::atomic<bool> done{false};
@@ -134,7 +137,7 @@ TEST_CASE("A client that pushes while the session commands nothing is told") {
   CHECK_FALSE(device.status().failed);  // it is told, and ends nothing
 }
 
-TEST_CASE("A connection that ends is no unplugged device, and says how it ended") {
+TEST_CASE("A connection that ends is no unplugged device, and says how it ended", "[untimed]") {
   struct Case {
     int code;
     const char* reason;

@@ -178,7 +178,7 @@ TEST_CASE("One client drives, a second reads only until the first has left") {
   CHECK(newtons == 3.0);
 }
 
-TEST_CASE("A client drives as long as it asks for a force") {
+TEST_CASE("A client drives as long as it asks for a force", "[untimed]") {
   Served served;
   const auto first = served.client(), second = served.client();
   // A force of zero drives nothing.
@@ -288,7 +288,8 @@ TEST_CASE("A client that does not read is closed, and connections are counted") 
   (void)state_after(*all.front(), "{}");
 }
 
-TEST_CASE("The server answers programs and its own page on this machine, and nobody else") {
+TEST_CASE("The server answers programs and its own page on this machine, and nobody else",
+          "[untimed]") {
   Served served;
   const int port = served.server->port();
   const auto answer = [port](const std::string& fields,

@@ -268,6 +268,7 @@ TEST_CASE("A session on the clock is served while it runs, to friends and others
   const test::TempFolder folder;
   Json json = test::short_session();
   json.erase("creep");
+  json["indentations"]["rates"] = {"20 mm/s"};
   json["indentations"]["hold"] = "0.3 s";
   json["indentations"]["rest"] = "0.1 s";
   json["limits"] = {{"watchdog", "16 ms"}, {"cycle_timeout", "1 s"}, {"late_cycles", 1000}};

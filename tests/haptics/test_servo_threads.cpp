@@ -55,6 +55,7 @@ TEST_CASE("On the clock a session takes its time, and every cycle is recorded or
   const test::TempFolder folder;
   Json json = test::short_session();
   json.erase("creep");
+  json["indentations"]["rates"] = {"20 mm/s"};
   json["indentations"]["hold"] = "0.2 s";
   json["indentations"]["rest"] = "0.1 s";
   HilSession session = test::parsed(json);
@@ -341,7 +342,8 @@ TEST_CASE("A machine that stalls does not end an identification by the simulated
              Catch::Contains("a watchdog that waits 1 s at least"));
 }
 
-TEST_CASE("Quantiles of times are the upper edges of their bins, and beyond the bins the largest") {
+TEST_CASE("Quantiles of times are the upper edges of their bins, and beyond the bins the largest",
+          "[untimed]") {
   TimeHistogram times;
   for (int i = 0; i < 50; ++i) times.note(500);
   for (int i = 0; i < 49; ++i) times.note(10'500);
@@ -354,7 +356,8 @@ TEST_CASE("Quantiles of times are the upper edges of their bins, and beyond the 
   CHECK_THAT(times.max_s(), Catch::Matchers::WithinRel(0.06, 1e-12));
 }
 
-TEST_CASE("The jitter check says no where a session with the same limits would have been stopped") {
+TEST_CASE("The jitter check says no where a session with the same limits would have been stopped",
+          "[untimed]") {
   JitterCheck check;
   check.rate_Hz = 4000.0;
   check.watchdog_s = check.cycle_timeout_s = 0.008;

@@ -76,6 +76,12 @@ MatrixXd solve_symmetric(const Eigen::Ref<const MatrixXd>& a, const Eigen::Ref<c
   return Eigen::LDLT<MatrixXd>(a).solve(b);
 }
 
+std::optional<MatrixXd> positive_inverse(const Eigen::Ref<const MatrixXd>& a) {
+  const Eigen::LLT<MatrixXd> factor(a);
+  if (factor.info() != Eigen::Success) return std::nullopt;
+  return factor.solve(MatrixXd::Identity(a.rows(), a.cols()));
+}
+
 Eigen::Matrix3d turn_onto(const Eigen::Vector3d& from, const Eigen::Vector3d& to) {
   constexpr double kOpposite = 1e-9;
   const double cosine = from.dot(to);

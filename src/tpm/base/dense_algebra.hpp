@@ -55,6 +55,9 @@ struct RightSingular {
 /// X of A X = B, A symmetric, by LDL' with pivoting. The lower triangle is read.
 [[nodiscard]] Eigen::MatrixXd solve_symmetric(const Eigen::Ref<const Eigen::MatrixXd>& a,
                                               const Eigen::Ref<const Eigen::MatrixXd>& b);
+/// Of a symmetric, positive definite matrix, by LL'; none of another. The lower triangle is read.
+[[nodiscard]] std::optional<Eigen::MatrixXd> positive_inverse(
+    const Eigen::Ref<const Eigen::MatrixXd>& a);
 
 /// The smallest turn that takes one unit vector onto another.
 [[nodiscard]] Eigen::Matrix3d turn_onto(const Eigen::Vector3d& from, const Eigen::Vector3d& to);

@@ -2,7 +2,6 @@
 
 #include <fmt/format.h>
 
-#include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <optional>
 
@@ -78,8 +77,7 @@ Eigen::Matrix3Xd by_least_curvature(const Equilibrium& equilibrium, const Positi
     Eigen::MatrixXd image(span.rows(), span.cols());
     for (Eigen::Index k = 0; k < span.cols(); ++k) image.col(k) = times(span.col(k));
     const Eigen::MatrixXd small = span.transpose() * image;
-    const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> solver(0.5 * (small + small.transpose()));
-    Eigen::VectorXd next = span * solver.eigenvectors().col(0);
+    Eigen::VectorXd next = span * symmetric_modes(0.5 * (small + small.transpose())).vectors.col(0);
     step = next - next.dot(mode) * mode;
     if (!next.allFinite() || !(step.norm() > 0.0)) break;
     mode = next.normalized();

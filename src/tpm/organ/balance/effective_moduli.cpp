@@ -1,9 +1,10 @@
 #include "tpm/organ/balance/effective_moduli.hpp"
 
-#include <Eigen/Cholesky>
 #include <algorithm>
 #include <cmath>
+#include <optional>
 
+#include "tpm/base/dense_algebra.hpp"
 #include "tpm/organ/balance/equilibrium.hpp"
 #include "tpm/organ/body/lattice.hpp"
 
@@ -126,10 +127,9 @@ Eigen::Matrix3d mean_stress(const Network& network, const InnerBlock& block,
 
 /// None where the elasticity is not positive definite.
 std::optional<EffectiveModuli> moduli_of(const Eigen::Matrix<double, 6, 6>& elasticity) {
-  const Eigen::LLT<Eigen::Matrix<double, 6, 6>> factor(elasticity);
-  if (factor.info() != Eigen::Success) return std::nullopt;
-  const Eigen::Matrix<double, 6, 6> compliance =
-      factor.solve(Eigen::Matrix<double, 6, 6>::Identity());
+  const std::optional<Eigen::MatrixXd> inverse = positive_inverse(elasticity);
+  if (!inverse) return std::nullopt;
+  const Eigen::MatrixXd& compliance = *inverse;
   EffectiveModuli moduli;
   moduli.young_Pa = compliance.diagonal().head<3>().cwiseInverse();
   for (Index i = 0; i < 3; ++i) {

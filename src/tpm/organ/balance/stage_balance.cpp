@@ -4,6 +4,7 @@
 #include <cmath>
 #include <limits>
 
+#include "tpm/base/dense_algebra.hpp"
 #include "tpmkit/error.hpp"
 
 namespace tpm::organ {
@@ -240,7 +241,7 @@ LaneSquare StageBalance::mixing(const StepWeights& weights) const {
     coupled -= relaxing_share_[law] * weights[i].mean.of_stages;
     factorised -= relaxing_share_[law] * relaxation_factor_(law);
   }
-  LaneSquare mixing = factorised * coupled.inverse();
+  LaneSquare mixing = factorised * solve_square(coupled, LaneSquare::Identity());
   for (Eigen::Index lane = stages_; lane < kLanes; ++lane)
     mixing.row(lane) = mixing.row(stages_ - 1);
   return mixing;

@@ -2,7 +2,6 @@
 
 #include <fmt/format.h>
 
-#include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <numeric>
 
@@ -101,11 +100,10 @@ Eigen::MatrixXd whole_motions(const Positions& rest, const Constraints& constrai
         motion - Eigen::Matrix<double, 3, 6>(constraints.projector(sphere) * motion);
     held += stopped.transpose() * stopped;
   }
-  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix<double, 6, 6>> solver(held);
-  const Eigen::Matrix<double, 6, 1> values = solver.eigenvalues();  // rising
+  const auto [values, vectors] = symmetric_modes(held);
   const auto free = (values.array() <= kNotStopped * std::max(values.maxCoeff(), 1.0)).count();
   if (free == 0) return Eigen::MatrixXd(motions.rows(), 0);
-  return orthonormal_columns(motions * solver.eigenvectors().leftCols(free));
+  return orthonormal_columns(motions * vectors.leftCols(free));
 }
 
 ZeroEnergyModes zero_energy_modes(const BondSystem& bonds, const Positions& rest,

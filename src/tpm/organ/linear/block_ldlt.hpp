@@ -1,6 +1,5 @@
 #pragma once
 #include <Eigen/Core>
-#include <Eigen/Eigenvalues>
 #include <Eigen/LU>
 #include <array>
 #include <cstdint>
