@@ -2,9 +2,12 @@
 #include <Eigen/Dense>
 #include <catch2/catch.hpp>
 #include <cmath>
+#include <fstream>
+#include <numbers>
 
 #include "coverage_studies.hpp"
 #include "refusal.hpp"
+#include "temp_folder.hpp"
 #include "tpm/files/blocks/law_json.hpp"
 #include "tpm/fit/fitted_law.hpp"
 #include "tpm/fit/predict/law_prediction.hpp"
@@ -218,6 +221,41 @@ TEST_CASE("a protocol is read from the blocks of a scene, its other blocks unsee
   CHECK_FALSE(has_protocol(parse_json("{\"organ\": {}}", "test")));
   const std::vector<double> times = times_over(file.protocol, 4);
   CHECK(times == std::vector<double>{0.0, 2.0, 4.0, 8.0, 12.0});
+}
+
+TEST_CASE("a law answers the sine and the recorded motion of a protocol file") {
+  const LawFile law = spring_law();
+  const ProtocolFile sine = parse_protocol_file(
+      parse_json(
+          R"({"protocol": {"kind": "sine", "depth": "4 mm", "frequency": "2 Hz", "cycles": 3},
+        "outputs": {"count": 25}})",
+          "test"),
+      "test");
+  REQUIRE(sine.times_s.size() == 25);
+  CHECK(sine.times_s.back() == Approx(1.5));
+  const LawPrediction wave = predict_law(law, sine.protocol, sine.times_s, {});
+  for (std::size_t i = 0; i < sine.times_s.size(); ++i) {
+    const double turn = 2.0 * std::numbers::pi * 2.0 * sine.times_s[i];
+    // F = k u with u = (1 - cos 2 pi f t) d/2, exact at the 64 points of a cycle.
+    const double expected = 100.0 * 2e-3 * (1.0 - std::cos(turn));
+    CHECK(wave.response[i] == Approx(expected).margin(1e-12));
+    CHECK(wave.standard_error[i] == Approx(0.02 * expected).margin(1e-12));
+  }
+  const test::TempFolder folder;
+  // Counted from its first reading, in time and in depth.
+  std::ofstream(folder / "push.csv")
+      << "time s,depth mm,force N\n5,1,0\n6,2,0.1\n8,4,0.3\n10,4,0.25\n";
+  const ProtocolFile recorded =
+      parse_protocol_file(parse_json(R"({"protocol": {"kind": "recording", "file": "push.csv"},
+        "outputs": {"count": 6}})",
+                                     "test"),
+                          (folder / "protocol.json"));
+  const LawPrediction push = predict_law(law, recorded.protocol, recorded.times_s, {});
+  REQUIRE(recorded.times_s == std::vector<double>{0.0, 1.0, 2.0, 3.0, 4.0, 5.0});
+  const std::vector<double> depth_m{0.0, 1e-3, 2e-3, 3e-3, 3e-3, 3e-3};
+  for (std::size_t i = 0; i < depth_m.size(); ++i) {
+    CHECK(push.response[i] == Approx(100.0 * depth_m[i]).margin(1e-15));
+  }
 }
 
 }  // namespace tpm::fit

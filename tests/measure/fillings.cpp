@@ -1,6 +1,6 @@
 // Prints the tables of reports/networks: how evenly the surface of a solid ball answers.
 //     build/release/tests/measure_fillings [FROM TO [alike]]
-//     build/release/tests/measure_fillings directions
+//     build/release/tests/measure_fillings directions [SHARE]
 // For 20 numbers of spheres (or those between FROM and TO) and each lattice: spheres that were
 // added, the least outer support, and over five pushes spread over the surface the largest over the
 // smallest stiffness and the smallest over the median, under one sphere and under a rigid patch
@@ -12,13 +12,15 @@
 // `directions`: how much of the difference is the lattice's, which has directions. Under the same
 // even pressure on the same disc (in mm) a ball of 8,000 spheres answers as the material does;
 // beside it the largest over the smallest of five means over eight places that the lattice cannot
-// tell from each other.
+// tell from each other. With a SHARE only fcc, whose second neighbours keep that share of their
+// stiffness: 0.25 makes the lattice isotropic.
 #include <fmt/format.h>
 
 #include <algorithm>
 #include <array>
 #include <cmath>
 #include <numeric>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -176,7 +178,8 @@ void measure(std::size_t from, std::size_t to, const std::array<Eigen::Vector3d,
   }
 }
 
-void measure_directions() {
+/// @param of_second share of their stiffness that second neighbours of fcc keep
+void measure_directions(std::optional<double> of_second) {
   constexpr std::array<std::size_t, 4> kCounts{400, 800, 1600, 3200};
   constexpr std::size_t kFine = 8000;
   constexpr std::size_t kEachThird = 3;  // of 24 turns
@@ -186,7 +189,9 @@ void measure_directions() {
       "| lattice | spheres | disc, mm | max/min of five means | the material ({} spheres) | one "
       "over the other |\n|---|---|---|---|---|---|\n",
       kFine);
+  const double of_long = of_second.value_or(1.0);
   for (const Lattice lattice : {Lattice::cubic, Lattice::bcc, Lattice::fcc}) {
+    if (of_second && lattice != Lattice::fcc) continue;
     SolidRequest request;
     request.lattice = lattice;
     std::vector<Organ> organs;
@@ -200,7 +205,8 @@ void measure_directions() {
     const Organ fine = fill_solid(ball, request);
     std::vector<std::vector<double>> of_material(kCounts.size());
     for (const Eigen::Vector3d& towards : test::kPushes) {
-      const std::vector<double> pressed = test::pressed_on_discs(fine, kRadius_m, towards, radii_m);
+      const std::vector<double> pressed =
+          test::pressed_on_discs(fine, kRadius_m, towards, radii_m, of_long);
       for (std::size_t i = 0; i < kCounts.size(); ++i) of_material[i].push_back(pressed[i]);
     }
     for (std::size_t i = 0; i < kCounts.size(); ++i) {
@@ -208,7 +214,8 @@ void measure_directions() {
       for (const Eigen::Vector3d& towards : test::kPushes) {
         double sum = 0.0;
         for (std::size_t turn = 0; turn < all.size(); turn += kEachThird) {
-          sum += test::pressed_on_discs(organs[i], kRadius_m, all[turn] * towards, {radii_m[i]})
+          sum += test::pressed_on_discs(organs[i], kRadius_m, all[turn] * towards, {radii_m[i]},
+                                        of_long)
                      .front();
         }
         means.push_back(sum);
@@ -226,13 +233,15 @@ void measure_directions() {
 }  // namespace
 
 int main(int argc, char** argv) {
-  return test::measured(argc, argv, 0, 3, "measure_fillings [FROM TO [alike]] | directions",
-                        [](const std::vector<std::string>& words) {
-                          if (words.size() == 1 && words[0] == "directions")
-                            return measure_directions();
-                          const bool all = words.size() < 2;
-                          measure(
-                              all ? 0 : std::stoul(words[0]), all ? 6000 : std::stoul(words[1]),
-                              words.size() == 3 && words[2] == "alike" ? kAlike : test::kPushes);
-                        });
+  return test::measured(
+      argc, argv, 0, 3, "measure_fillings [FROM TO [alike]] | directions [SHARE]",
+      [](const std::vector<std::string>& words) {
+        if (!words.empty() && words[0] == "directions") {
+          return measure_directions(words.size() > 1 ? std::optional(std::stod(words[1]))
+                                                     : std::nullopt);
+        }
+        const bool all = words.size() < 2;
+        measure(all ? 0 : std::stoul(words[0]), all ? 6000 : std::stoul(words[1]),
+                words.size() == 3 && words[2] == "alike" ? kAlike : test::kPushes);
+      });
 }

@@ -367,6 +367,15 @@ TEST_CASE("roughness is stated where something has moved", "[heavy]") {
   CHECK(found->near_contact < 1.0);
 }
 
+TEST_CASE("a tissue that may snap through is named with the place where it is softest") {
+  const std::string refusal = refusal_of([] {
+    (void)run_of(small_scene(
+        R"("anchors": [{"kind": "inner_layer"}], "contacts": [{"kind": "sphere", "number": 13}],
+           "protocol": {"kind": "ramp_hold", "depth": "40 mm", "rate": "40 mm/s", "hold": "1 s"})"));
+  });
+  CHECK_THAT(refusal, Contains("it may snap through around sphere ") && Contains(" mm"));
+}
+
 TEST_CASE("a load that nothing carries is refused where the tissue collapses", "[heavy]") {
   CHECK_THAT(refusal_of([] {
                (void)run_of(small_scene(

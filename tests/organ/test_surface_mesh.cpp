@@ -108,18 +108,42 @@ TEST_CASE("the place of a point that moves is that of a new question, to the las
     const MeshSurface surface(closed_mesh(mesh, "mesh").mesh);
     Random random(5);
     Vector3d walker = surface.mesh().corner(0, 0);
-    int part = -1;
+    NearParts near;
     for (int i = 0; i < 300; ++i) {
       // On the surface, close to it, and far inside, now and then in one leap.
       const double step = i % 50 == 0 ? 1.0 : i % 3 == 0 ? 0.0 : 1e-3;
       for (double& x : walker) x += step * random.normal();
       const Vector3d expected = surface.nearest_position(walker, 10.0);
-      CHECK(surface.nearest_of_moved(walker, 10.0, part) == expected);
-      CHECK((part >= 0 && part < mesh.triangles.cols()));
+      CHECK(surface.nearest_of_moved(walker, 10.0, near) == expected);
+      CHECK((near.part >= 0 && near.part < mesh.triangles.cols()));
       if (i % 3 == 1) walker = expected;
     }
-    int beyond = static_cast<int>(mesh.triangles.cols());
+    NearParts beyond;
+    beyond.part = static_cast<int>(mesh.triangles.cols());
     CHECK(surface.nearest_of_moved(walker, 10.0, beyond) == surface.nearest_position(walker, 10.0));
+  }
+}
+
+TEST_CASE(
+    "a point that creeps over a mesh is placed among the triangles near it, to the last bit") {
+  for (const TriangleMesh& mesh : {unit_cube(), round_cube(3), round_cube(40)}) {
+    const MeshSurface surface(closed_mesh(mesh, "mesh").mesh);
+    Random random(7);
+    Vector3d walker =
+        (surface.mesh().corner(0, 0) + surface.mesh().corner(0, 1) + surface.mesh().corner(0, 2)) /
+        3.0;
+    NearParts near;
+    int lists = 0;
+    constexpr int kSteps = 2000;
+    for (int i = 0; i < kSteps; ++i) {
+      const Vector3d listed = near.place;
+      for (double& x : walker) x += 1e-4 * random.normal();
+      const Vector3d expected = surface.nearest_position(walker, 1.0);
+      CHECK(surface.nearest_of_moved(walker, 1.0, near) == expected);
+      if (near.place != listed) ++lists;
+      walker = expected;
+    }
+    CHECK(lists < kSteps / 2);
   }
 }
 

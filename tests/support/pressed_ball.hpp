@@ -40,10 +40,17 @@ inline std::vector<Eigen::Matrix3d> turns() {
 /// Force over mean displacement under an even pressure on discs about one place of a ball about the
 /// origin, N/m, instantaneous at rest, with the far 30 % of the depth fixed. A sphere at the rim
 /// counts with its share.
+/// @param of_long stiffness of the bonds beyond 1.2 spacings (in fcc those of second neighbours)
+///   over what tpm gives them
 inline std::vector<double> pressed_on_discs(const Organ& organ, double ball_m,
                                             const Eigen::Vector3d& towards,
-                                            const std::vector<double>& radii_m) {
-  const Network network = build_network(organ, {}, "ball");
+                                            const std::vector<double>& radii_m,
+                                            double of_long = 1.0) {
+  constexpr double kLong = 1.2;  // spacings
+  Network network = build_network(organ, {}, "ball");
+  for (Bond& bond : network.bonds) {
+    if (bond.rest_length_m > kLong * organ.spacing) bond.factor *= of_long;
+  }
   const Positions& at = network.organ.position;
   const Eigen::Vector3d normal = towards.normalized();
   const auto outer = std::count(organ.layer.begin(), organ.layer.end(), 0);

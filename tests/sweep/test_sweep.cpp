@@ -266,6 +266,32 @@ TEST_CASE("a material that no tissue has is refused before the first cell") {
   CHECK(refusal.find("E1 = -12000 Pa") != std::string::npos);
 }
 
+TEST_CASE("a sweep refuses protocols whose numbers it does not vary, and says so") {
+  const auto refusal_with =
+      [](const std::string& protocol) {
+        return test::refusal_of([&] {
+          static_cast<void>(parsed(R"({"model": "organ", "scene": {"organ": {"kind": "star"},
+        "protocol": )" + protocol + R"(},
+        "axes": [{"parameter": "/material/E1", "values": ["6 kPa", "12 kPa"]}],
+        "outputs": ["peak_force"]})"));
+        });
+      };
+  const std::string sine =
+      refusal_with(R"({"kind": "sine", "depth": "4 mm", "frequency": "0.5 Hz", "cycles": 2})");
+  CHECK(sine.find("/scene/protocol/kind") != std::string::npos);
+  CHECK(sine.find("a sweep does not vary a 'sine'") != std::string::npos);
+  CHECK(sine.find("ramp_hold, step_hold, creep, knots") != std::string::npos);
+  const std::string missing = refusal_with(R"({"kind": "recording", "file": "not_there.csv"})");
+  CHECK(missing.find("not_there.csv") != std::string::npos);
+  const test::TempFolder folder;
+  std::ofstream(folder / "push.csv") << "time s,depth mm,force N\n0,0,0\n1,1,0.1\n2,2,0.2\n";
+  const std::string recording =
+      refusal_with(R"({"kind": "recording", "file": ")" + (folder / "push.csv") + "\"}");
+  CHECK(recording.find("a sweep does not vary a 'recording'") != std::string::npos);
+  const std::string unknown = refusal_with(R"({"kind": "cosine", "depth": "4 mm"})");
+  CHECK(unknown.find("unknown") != std::string::npos);
+}
+
 TEST_CASE("a sweep over a star as a network is the sweep over it in closed form") {
   const Sweep star = parsed(R"({"model": "organ", "block": 5, "scene": {
       "organ": {"kind": "star", "spacing": "30 mm"},

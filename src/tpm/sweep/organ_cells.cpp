@@ -413,6 +413,16 @@ void require_outputs(const OrganSetup& setup, const DocumentPlace& place) {
   }
 }
 
+/// A scene may have more kinds of protocols than those whose numbers a sweep knows by name.
+void require_swept_kind(const Json& protocol, const DocumentPlace& place) {
+  const auto& kind = protocol.at("kind").get_ref<const std::string&>();
+  std::vector<std::string> known;
+  for (const auto& word : kProtocolKindWords) known.emplace_back(word.text);
+  if (std::find(known.begin(), known.end(), kind) != known.end()) return;
+  throw bad_input(place.key("kind").where, fmt::format("a sweep does not vary a '{}'", kind),
+                  fmt::format("one of {}", fmt::join(known, ", ")));
+}
+
 }  // namespace
 
 std::shared_ptr<const SweepModel> organ_sweep_model(const SweepKeys& keys, std::string_view where,
@@ -441,8 +451,10 @@ std::shared_ptr<const SweepModel> organ_sweep_model(const SweepKeys& keys, std::
   }
   // Of the sweep, not of the scene; here where pointers find it.
   if (stepped) setup.scene[kIntegrator] = keys.integrator;
-  setup.protocol = parse_protocol_block(setup.scene.at("protocol"),
-                                        place.key("scene").key("protocol"), Openness::complete);
+  const DocumentPlace at_protocol = place.key("scene").key("protocol");
+  require_swept_kind(setup.scene.at("protocol"), at_protocol);
+  setup.protocol =
+      parse_protocol_block(setup.scene.at("protocol"), at_protocol, Openness::complete);
   setup.material = scene.tissue.materials.materials.front();
   setup.by_depth = scene.protocol.drive() == Drive::displacement;
   require_outputs(setup, place.key("outputs"));

@@ -103,11 +103,19 @@ std::string buckling_place(Equilibrium& equilibrium, const Positions& position,
                      significant(place.y(), 4), significant(place.z(), 4));
 }
 
-std::string buckling_words(DrivenTissue& tissue, const TissueState& state) {
+std::string softest_place(DrivenTissue& tissue, const TissueState& state) {
   const auto spheres = static_cast<Eigen::Index>(tissue.bonds().without_tools().spheres());
+  return buckling_place(tissue.equilibrium(), state.position, {state.mean, 0.0, state.closed},
+                        spheres);
+}
+
+std::string snap_words(DrivenTissue& tissue, const TissueState& state) {
+  return ": it may snap through" + softest_place(tissue, state);
+}
+
+std::string buckling_words(DrivenTissue& tissue, const TissueState& state) {
   return fmt::format("buckles{}: its stiffness is no longer positive",
-                     buckling_place(tissue.equilibrium(), state.position,
-                                    {state.mean, 0.0, state.closed}, spheres));
+                     softest_place(tissue, state));
 }
 
 }  // namespace tpm::organ

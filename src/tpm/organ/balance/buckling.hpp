@@ -12,6 +12,12 @@ namespace tpm::organ {
 /// @param state the last in balance; the factorisation of the tissue is lost
 [[nodiscard]] std::string buckling_words(DrivenTissue& tissue, const TissueState& state);
 
+/// The place where a tissue is softest, as in buckling_words: of one that is stable and finds no
+/// balance near, where it is likely to snap through.
+[[nodiscard]] std::string softest_place(DrivenTissue& tissue, const TissueState& state);
+/// ": it may snap through around sphere 12 at (1, 2, 3) mm", with that place.
+[[nodiscard]] std::string snap_words(DrivenTissue& tissue, const TissueState& state);
+
 /// The place of buckling_words: " around sphere 12 at (1, 2, 3) mm".
 /// @param equilibrium its factorisation is lost
 /// @param position the last in balance, m

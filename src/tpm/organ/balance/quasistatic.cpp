@@ -97,7 +97,7 @@ class Run {
   [[nodiscard]] Error lost(double imposed, bool unstable, const std::string& otherwise) {
     if (unstable)
       return failed(imposed, "the tissue " + buckling_words(tissue_, state_), ErrorCause::buckled);
-    return failed(imposed, otherwise + ": it may snap through", ErrorCause::snapped_through);
+    return failed(imposed, otherwise + snap_words(tissue_, state_), ErrorCause::snapped_through);
   }
 
   /// Puts the tissue at rest and sets what tolerances refer to.

@@ -29,9 +29,9 @@ int sweeps_for(std::size_t count) {
 
 /// Each point is pushed away from those nearer than the reach, then put back on the surface.
 /// @param near reaches as far
-/// @param parts of the surface on which the points lie
+/// @param parts of the surface near each point
 void repel(const Surface& surface, double spacing, double step, NearPairs& near,
-           std::vector<int>& parts, Positions& points) {
+           std::vector<NearParts>& parts, Positions& points) {
   const double reach = kReach * spacing;
   Positions push = Positions::Zero(3, points.cols());
   for (const NeighbourPair& pair : near.of(points)) {
@@ -81,7 +81,7 @@ Positions even_points(const Surface& surface, std::size_t count, std::uint64_t s
   const double spacing = even_spacing(surface, count);
   const int sweeps = sweeps_for(count);
   NearPairs near(kReach * spacing);
-  std::vector<int> parts(count, -1);
+  std::vector<NearParts> parts(count);
   for (int sweep = 0; sweep < sweeps; ++sweep) {
     // Large steps first to even out the density, small ones at the end to settle.
     const double left = 1.0 - static_cast<double>(sweep) / sweeps;

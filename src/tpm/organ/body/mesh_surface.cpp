@@ -113,10 +113,9 @@ Vector3d MeshSurface::nearest_position(const Vector3d& point, double within) con
   return tree_.nearest(point, within).position;
 }
 
-Vector3d MeshSurface::nearest_of_moved(const Vector3d& point, double within, int& part) const {
-  const TrianglePoint at = tree_.nearest_beside(point, within, part);
-  part = at.triangle;
-  return at.position;
+Vector3d MeshSurface::nearest_of_moved(const Vector3d& point, double within,
+                                       NearParts& near) const {
+  return tree_.nearest_of_moved(point, within, near).position;
 }
 
 double MeshSurface::signed_distance(const Vector3d& point) const {

@@ -19,7 +19,7 @@ class MeshSurface final : public Surface {
   [[nodiscard]] Eigen::Vector3d nearest_position(const Eigen::Vector3d& point,
                                                  double within) const override;
   [[nodiscard]] Eigen::Vector3d nearest_of_moved(const Eigen::Vector3d& point, double within,
-                                                 int& part) const override;
+                                                 NearParts& near) const override;
   [[nodiscard]] double signed_distance(const Eigen::Vector3d& point) const override;
   [[nodiscard]] Positions spread(std::size_t count, std::uint64_t seed) const override;
   [[nodiscard]] Eigen::AlignedBox3d bounds() const override { return tree_.bounds(); }

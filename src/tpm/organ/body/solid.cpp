@@ -27,8 +27,7 @@ constexpr double kShallow = 2.0;
 class DeepPoints {
  public:
   DeepPoints(const Surface& surface, Lattice lattice, double spacing)
-      : surface_(surface),
-        points_(lattice, spacing),
+      : points_(lattice, spacing),
         least_(kLeastDepth * spacing),
         centre_(surface.bounds().center()) {
     const Vector3d half = 0.5 * surface.bounds().sizes() / points_.pitch();
@@ -43,10 +42,11 @@ class DeepPoints {
     return found;
   }
 
+  /// @param known of a surface whose points were counted
   /// @param depth of each, m, or less
-  [[nodiscard]] Positions collect(std::vector<double>& depth) const {
+  [[nodiscard]] Positions collect(KnownMargins& known, std::vector<double>& depth) const {
     std::vector<Vector3d> found;
-    rows([&](const Vector3d& point) { return -surface_.signed_distance(point) - least_; },
+    rows([&](const Vector3d& point) { return known.margin(point, least_); },
          [&](const Vector3d& first, std::size_t length, double margin) {
            for (std::size_t s = 0; s < length; ++s) {
              const double along = stride() * static_cast<double>(s);
@@ -94,7 +94,6 @@ class DeepPoints {
     }
   }
 
-  const Surface& surface_;
   LatticePoints points_;
   double least_;
   Vector3d centre_;
@@ -140,11 +139,11 @@ struct InnerSphere {
   bool settled = true;  ///< else the depth is at least this, and outwards is not known
 };
 
-/// @param part of the surface, near which the one before lay
+/// @param near parts of the surface near the one before
 InnerSphere inner_sphere(const Surface& surface, Eigen::Index point, const Vector3d& place,
-                         int& part) {
+                         NearParts& near) {
   constexpr double kAnywhere = std::numeric_limits<double>::infinity();
-  InnerSphere sphere{point, place, surface.nearest_of_moved(place, kAnywhere, part) - place,
+  InnerSphere sphere{point, place, surface.nearest_of_moved(place, kAnywhere, near) - place,
                      0.0,   0,     true};
   sphere.depth = sphere.outwards.norm();
   return sphere;
@@ -159,12 +158,12 @@ bool is_deeper(const InnerSphere& a, const InnerSphere& b) {
 std::vector<InnerSphere> by_depth(const Surface& surface, const Positions& points,
                                   const std::vector<double>& least, double shallow) {
   std::vector<InnerSphere> inner(static_cast<std::size_t>(points.cols()));
-  int part = -1;
+  NearParts near;
   for (std::size_t i = 0; i < inner.size(); ++i) {
     const auto point = static_cast<Eigen::Index>(i);
     inner[i] = least[i] > shallow
                    ? InnerSphere{point, points.col(point), Vector3d::Zero(), least[i], 0, false}
-                   : inner_sphere(surface, point, points.col(point), part);
+                   : inner_sphere(surface, point, points.col(point), near);
   }
   std::sort(inner.begin(), inner.end(), is_deeper);
   return inner;
@@ -185,7 +184,7 @@ struct SolidFilling {
 
 /// Asks how deep the deep spheres lie, which only what is kept of a filling needs.
 void settle(const Surface& surface, SolidFilling& filling) {
-  int part = -1;
+  NearParts near;
   // In the order of the lattice, in which each is near the one before.
   std::vector<InnerSphere*> open;
   for (InnerSphere& sphere : filling.inner) {
@@ -194,7 +193,7 @@ void settle(const Surface& surface, SolidFilling& filling) {
   std::sort(open.begin(), open.end(),
             [](const InnerSphere* a, const InnerSphere* b) { return a->point < b->point; });
   for (InnerSphere* sphere : open) {
-    *sphere = inner_sphere(surface, sphere->point, sphere->place, part);
+    *sphere = inner_sphere(surface, sphere->point, sphere->place, near);
   }
   const auto end = std::find_if(
       filling.inner.begin(), filling.inner.end(),
@@ -204,11 +203,11 @@ void settle(const Surface& surface, SolidFilling& filling) {
 
 /// @param most spheres; the lattice's shallowest are left out
 SolidFilling lattice_filling(const Surface& surface, const SolidRequest& request, double spacing,
-                             std::size_t most) {
+                             std::size_t most, KnownMargins& known) {
   SolidFilling filling;
   filling.spacing = spacing;
   std::vector<double> least;
-  const Positions lattice = DeepPoints(surface, request.lattice, spacing).collect(least);
+  const Positions lattice = DeepPoints(surface, request.lattice, spacing).collect(known, least);
   const std::size_t all = even_count(surface, spacing) + static_cast<std::size_t>(lattice.cols());
   require_sphere_count(std::min(all, most));
   filling.outer =
@@ -244,9 +243,9 @@ Positions shallow(const SolidFilling& filling) {
 }
 
 void add_inner(const Surface& surface, SolidFilling& filling, const Positions& added) {
-  int part = -1;
+  NearParts near;
   for (Eigen::Index i = 0; i < added.cols(); ++i) {
-    filling.inner.push_back(inner_sphere(surface, filling.next_point++, added.col(i), part));
+    filling.inner.push_back(inner_sphere(surface, filling.next_point++, added.col(i), near));
   }
 }
 
@@ -419,7 +418,7 @@ SolidFilling counted_filling(const Surface& surface, const SolidRequest& request
   SolidFilling filling;
   for (int round = 0; round < kRounds; ++round) {
     const double spacing = spacing_for(surface, request.lattice, lattice, known);
-    filling = lattice_filling(surface, request, spacing, 2 * count);
+    filling = lattice_filling(surface, request, spacing, 2 * count, known);
     add_support(surface, filling, kWantedInside, count);
     if (filling.count() >= count) break;
     lattice += count - filling.count();
@@ -452,7 +451,7 @@ Organ fill_solid(const Surface& surface, const SolidRequest& request) {
   const double spacing = decided_spacing(surface, request, known);
   require_room(surface, spacing);
   const std::size_t most = request.count.value_or(std::numeric_limits<std::size_t>::max());
-  SolidFilling filling = lattice_filling(surface, request, spacing, most);
+  SolidFilling filling = lattice_filling(surface, request, spacing, most, known);
   if (const std::size_t added = add_support(surface, filling, kWantedInside, most);
       added > 0 && request.count) {
     filling = counted_filling(surface, request, std::move(filling), added, known);

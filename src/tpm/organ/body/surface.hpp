@@ -1,6 +1,7 @@
 #pragma once
 #include <Eigen/Core>
 #include <Eigen/Geometry>
+#include <array>
 #include <cstddef>
 #include <cstdint>
 
@@ -12,6 +13,17 @@ namespace tpm::organ {
 struct SurfacePoint {
   Eigen::Vector3d position;  ///< m
   Eigen::Vector3d normal;
+};
+
+/// The parts of a surface near a place, which Surface::nearest_of_moved keeps from one question to
+/// the next. Before the first question none are known.
+struct NearParts {
+  static constexpr std::size_t kMost = 16;
+  int part = -1;  ///< on which the last answer lies, as the surface numbers them
+  Eigen::Vector3d place = Eigen::Vector3d::Zero();  ///< where the parts were listed
+  double reach = 0.0;  ///< all parts that come nearer to the place than this are listed, m
+  std::size_t count = 0;
+  std::array<int, kMost> listed{};
 };
 
 /// A closed surface that bounds one body: what a filling asks of a shape, by several threads at
@@ -32,12 +44,11 @@ class Surface {
   [[nodiscard]] virtual Eigen::Vector3d nearest_position(const Eigen::Vector3d& point,
                                                          double within) const = 0;
   /// The same place of a point that moves a little between one question and the next, found faster
-  /// beside the answer before.
-  /// @param part of the surface, as the surface numbers them; any number at first, and the part of
-  ///   this answer afterwards
+  /// among the parts near the answer before.
+  /// @param near of this point alone
   [[nodiscard]] virtual Eigen::Vector3d nearest_of_moved(const Eigen::Vector3d& point,
-                                                         double within, int& part) const {
-    (void)part;
+                                                         double within, NearParts& near) const {
+    (void)near;
     return nearest_position(point, within);
   }
   /// Distance to the surface, negative inside.

@@ -19,6 +19,12 @@ constexpr int kAlone = 4096;  // triangles that one thread splits
 /// Of lengths that leave triangles out, so that rounding leaves none out that is nearest.
 constexpr double kRoundedUp = 1.0 + 1e-9;
 
+/// Of the mesh's extent: of two distances that differ by less, rounding may make either the lesser.
+constexpr double kDoubt = 1e-13;
+/// Halving leaves at most 31 levels below an int of triangles, three of them to a node, each with
+/// all children but one set aside.
+constexpr std::size_t kOpen = 96;
+
 using Eigen::Vector3d;
 
 /// Nearest point on the edge from corner `from` to corner `to`, as weights of the three corners.
@@ -190,9 +196,7 @@ TrianglePoint TriangleTree::nearest(const Vector3d& point, double within) const 
     double bound;
     int first, count;
   };
-  // Halving leaves at most 31 levels below an int of triangles, three of them to a node, each with
-  // all children but one set aside.
-  std::array<Open, 96> open;
+  std::array<Open, kOpen> open;
   std::size_t depth = 0;
   double reach = kRoundedUp * within;
   open[depth++] = {0.0, 0, 0};
@@ -246,6 +250,89 @@ TrianglePoint TriangleTree::nearest_beside(const Vector3d& point, double within,
   // Rounding must not leave out that triangle itself, on which the point may lie.
   const double rounding = 1e-12 * bounds_.diagonal().norm();
   return nearest(point, std::min(within, distance + rounding));
+}
+
+TrianglePoint TriangleTree::nearest_of_moved(const Vector3d& point, double within,
+                                             NearParts& near) const {
+  const double moved = near.part < 0 ? kAnywhere : (point - near.place).norm();
+  if (moved < near.reach) {
+    if (const auto found = nearest_listed(point, near.reach - moved, near)) {
+      near.part = found->triangle;
+      return *found;
+    }
+  }
+  const TrianglePoint found = nearest_beside(point, within, near.part);
+  near.part = found.triangle;
+  // A list that reaches on is kept: on an edge rounding would have decided.
+  if (!(2.0 * moved < near.reach)) list(point, moved, found, near);
+  return found;
+}
+
+std::optional<TrianglePoint> TriangleTree::nearest_listed(const Vector3d& point, double sure,
+                                                          const NearParts& near) const {
+  const double doubt = kDoubt * bounds_.diagonal().norm();
+  TrianglePoint best;
+  best.squared_distance = sure * sure;
+  double limit = kRoundedUp * sure + doubt, second = sure;
+  for (std::size_t i = 0; i < near.count; ++i) {
+    const auto at = static_cast<std::size_t>(near.listed[i]);
+    const auto& [a, b, c, normal, centre, radius] = packed_[at];
+    if ((centre - point).squaredNorm() > (radius + limit) * (radius + limit)) continue;
+    if (std::abs(normal.dot(point - a)) > limit) continue;
+    const Vector3d weights = nearest_weights(a, b, c, point);
+    const Vector3d position = weights[0] * a + weights[1] * b + weights[2] * c;
+    const double squared = (position - point).squaredNorm();
+    if (squared >= best.squared_distance) {
+      second = std::min(second, std::sqrt(squared));
+      continue;
+    }
+    if (best.triangle >= 0) second = std::min(second, std::sqrt(best.squared_distance));
+    best = {order_[at], weights, position, squared};
+    limit = kRoundedUp * std::sqrt(squared) + doubt;
+  }
+  if (best.triangle < 0 || second <= limit) return std::nullopt;
+  return best;
+}
+
+void TriangleTree::list(const Vector3d& point, double moved, const TrianglePoint& nearest,
+                        NearParts& near) const {
+  constexpr double kLittle = 0.25, kReach = 0.6;  // of an edge of the nearest triangle
+  near.place = point;
+  near.reach = 0.0;
+  near.count = 0;
+  const double edge =
+      (mesh_.corner(nearest.triangle, 1) - mesh_.corner(nearest.triangle, 0)).norm();
+  const double distance = std::sqrt(nearest.squared_distance);
+  // A point that moves farther leaves the list soon, one far from the surface has many beside it.
+  if (moved > kLittle * edge || distance > kLittle * edge) return;
+  const double reach = distance + kReach * edge;
+  struct Open {
+    int first, count;
+  };
+  std::array<Open, kOpen> open;
+  std::size_t depth = 0;
+  open[depth++] = {0, 0};
+  while (depth > 0) {
+    const auto [first, count] = open[--depth];
+    if (count == 0) {
+      const Node& node = nodes_[static_cast<std::size_t>(first)];
+      const OfChildren squared = squared_distances(node, point);
+      for (std::size_t i = 0; i < kChildren; ++i) {
+        if (squared[static_cast<Eigen::Index>(i)] < reach * reach)
+          open[depth++] = {node.first[i], node.count[i]};
+      }
+      continue;
+    }
+    for (int at = first; at < first + count; ++at) {
+      const Packed& packed = packed_[static_cast<std::size_t>(at)];
+      const double within = packed.radius + reach;
+      if ((packed.centre - point).squaredNorm() > within * within) continue;
+      if (std::abs(packed.normal.dot(point - packed.a)) > reach) continue;
+      if (near.count == NearParts::kMost) return;
+      near.listed[near.count++] = at;
+    }
+  }
+  near.reach = reach / kRoundedUp;
 }
 
 std::vector<int> TriangleTree::meeting(const Eigen::AlignedBox3d& box) const {

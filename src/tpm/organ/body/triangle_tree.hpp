@@ -2,8 +2,10 @@
 #include <Eigen/Geometry>
 #include <array>
 #include <limits>
+#include <optional>
 #include <vector>
 
+#include "tpm/organ/body/surface.hpp"
 #include "tpm/organ/body/triangle_mesh.hpp"
 
 namespace tpm::organ {
@@ -34,6 +36,11 @@ class TriangleTree {
   /// @param triangle any number: beyond those of the mesh it saves nothing
   [[nodiscard]] TrianglePoint nearest_beside(const Eigen::Vector3d& point, double within,
                                              int triangle) const;
+  /// As nearest(), to the last bit, and faster for a point that moves a little between one question
+  /// and the next: the triangles near it are listed, and while it moves less than the list reaches
+  /// they alone are asked.
+  [[nodiscard]] TrianglePoint nearest_of_moved(const Eigen::Vector3d& point, double within,
+                                               NearParts& near) const;
   /// The triangles whose bounding boxes meet a box, in rising order.
   [[nodiscard]] std::vector<int> meeting(const Eigen::AlignedBox3d& box) const;
   [[nodiscard]] Eigen::AlignedBox3d box_of(int triangle) const;
@@ -66,6 +73,15 @@ class TriangleTree {
   void split(std::vector<Half>& halves, int node, int below, int first, int count,
              const std::vector<Eigen::AlignedBox3d>& boxes);
   void pack(int first, int count);
+  /// Among the listed triangles; none if one that is not listed, or rounding, might decide.
+  /// @param sure triangles that are not listed are at least as far away, m
+  [[nodiscard]] std::optional<TrianglePoint> nearest_listed(const Eigen::Vector3d& point,
+                                                            double sure,
+                                                            const NearParts& near) const;
+  /// Lists the triangles near a point, unless they are many.
+  /// @param moved since the last question, m
+  void list(const Eigen::Vector3d& point, double moved, const TrianglePoint& nearest,
+            NearParts& near) const;
   /// Adds the node of a half, whose children are at most three halvings below, and those below it.
   int join(const std::vector<Half>& halves, int half);
 
