@@ -58,8 +58,7 @@ TEST_CASE("the phi that readings leave possible spread as the curvature of the l
 }
 
 TEST_CASE("zero and drift of correlated rests are held in 93 to 97 %", "[placement]") {
-  // 926 to 971 of 1,000. At the most likely phi alone they were held in fewer at phi 0.9: two rests
-  // of 40 readings tell it badly, and where it comes out small both look exact.
+  // 926 to 971 of 1,000.
   constexpr int kSets = 1000, kFewest = 926, kMost = 971;
   const std::vector<double> time_s = rest_times_s();
   for (const double phi : {0.5, 0.9}) {

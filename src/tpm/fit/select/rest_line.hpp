@@ -32,8 +32,7 @@ struct RestLine {
 };
 
 /// Fits a line, or a level, by generalised least squares. Where the correlation is significant the
-/// intervals count every phi that the readings leave possible (possible_autoregressions): 40
-/// samples leave phi open from 0.8 to 0.95, and with it the variance of a mean by a factor of 4.
+/// intervals count every phi that the readings leave possible (possible_autoregressions).
 /// @param rounding uncertainty by the rounding of the readings
 /// @param hold whose noise is that of the rests; null: the rests alone tell it
 [[nodiscard]] RestLine fit_rest_line(const std::vector<double>& time_s,
