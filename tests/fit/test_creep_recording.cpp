@@ -91,20 +91,7 @@ TEST_CASE("a stress that was held is imposed, and the strain compared", "[creep]
 }
 
 TEST_CASE("creep is fitted with its recovery, where a specimen has no contact to lose", "[creep]") {
-  // The stress is taken away again: by superposition the strain of a second ramp is subtracted.
-  constexpr double kTakenAway_s = 30.0;
-  CreepTrial trial{.noise = 6e-5};
-  CreepTrial away = trial;
-  away.rest_s = kTakenAway_s;
-  Recording r = test::creep_recording_of(trial);
-  Random random(5);
-  for (double t = 30.1; t < 90.05; t += 0.1) {
-    r.time_s.push_back(t);
-    r.drive.push_back(test::creep_strain(trial, t) - test::creep_strain(away, t) +
-                      trial.noise * random.normal());
-    r.response.push_back(trial.stress_Pa *
-                         (1.0 - std::clamp((t - kTakenAway_s) / trial.ramp_s, 0.0, 1.0)));
-  }
+  Recording r = test::with_recovery({.noise = 6e-5});
   const double end_s = r.time_s.back();
   const PreparedRecording prepared = prepare_recording("creep.csv", std::move(r));
   REQUIRE(prepared.load_imposed);

@@ -50,6 +50,24 @@ inline Recording creep_recording_of(const CreepTrial& trial) {
   return r;
 }
 
+/// The stress is taken away again after 30 s: by superposition the strain of a second ramp is
+/// subtracted.
+inline Recording with_recovery(const CreepTrial& trial) {
+  constexpr double kTakenAway_s = 30.0;
+  CreepTrial away = trial;
+  away.rest_s = kTakenAway_s;
+  Recording r = creep_recording_of(trial);
+  base::Random random(5);
+  for (double t = 30.1; t < 90.05; t += 0.1) {
+    r.time_s.push_back(t);
+    r.drive.push_back(creep_strain(trial, t) - creep_strain(away, t) +
+                      trial.noise * random.normal());
+    r.response.push_back(trial.stress_Pa *
+                         (1.0 - std::clamp((t - kTakenAway_s) / trial.ramp_s, 0.0, 1.0)));
+  }
+  return r;
+}
+
 /// Creep of an indentation through contact: 2 and 3 kN/m at a depth of `reference_m`, times u (u /
 /// reference)^(power - 1), so that V = u^power / reference^(power - 1) creeps as a strain does.
 struct PressTrial {

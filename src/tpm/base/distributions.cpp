@@ -21,6 +21,11 @@ double student_quantile(double p, double degrees) {
   return boost::math::quantile(boost::math::students_t(degrees), p);
 }
 
+double student_cdf(double x, double degrees) {
+  using InDouble = boost::math::policies::policy<boost::math::policies::promote_double<false>>;
+  return boost::math::cdf(boost::math::students_t_distribution<double, InDouble>(degrees), x);
+}
+
 double quick_student_quantile(double p, double degrees) {
   using InDouble = boost::math::policies::policy<boost::math::policies::promote_double<false>>;
   return boost::math::quantile(boost::math::students_t_distribution<double, InDouble>(degrees), p);

@@ -12,7 +12,9 @@ namespace tpm::base {
 
 /// x with P(X <= x) = p of Student's distribution; p in (0, 1), degrees > 0.
 [[nodiscard]] double student_quantile(double p, double degrees);
-/// The same in double: where many are needed, to about 1e-14.
+/// P(X <= x) of Student's distribution, in double; degrees > 0.
+[[nodiscard]] double student_cdf(double x, double degrees);
+/// student_quantile in double: where many are needed, to about 1e-14.
 [[nodiscard]] double quick_student_quantile(double p, double degrees);
 
 /// x with P(X <= x) = p of chi squared; p in [0, 1), degrees > 0.

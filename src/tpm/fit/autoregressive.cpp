@@ -1,6 +1,7 @@
 #include "tpm/fit/autoregressive.hpp"
 
 #include <Eigen/Cholesky>
+#include <algorithm>
 #include <boost/math/tools/minima.hpp>
 #include <cmath>
 #include <limits>
@@ -120,6 +121,40 @@ AutoregressionEstimate estimate_autoregression(std::span<const double> time_s,
       (high.criterion - 2.0 * centre.criterion + low.criterion) / (half * half);
   if (curvature > 0.0) estimate.phi_variance = 2.0 / curvature;
   return estimate;
+}
+
+std::vector<PossibleAutoregression> possible_autoregressions(std::span<const double> time_s,
+                                                             const Eigen::VectorXd& residual,
+                                                             const Eigen::MatrixXd& jacobian,
+                                                             double step_s,
+                                                             const AutoregressionEstimate& found) {
+  constexpr double kNegligible = 16.0;  // above the least criterion
+  constexpr double kStep = 0.5, kLeastStep = 0.01, kMostStep = 0.25;
+  const RestrictedLikelihood likelihood(time_s, residual, jacobian, step_s);
+  const auto freedom = static_cast<double>(residual.size() - jacobian.cols());
+  const double end = -std::log(1.0 - kMostPhi);
+  const double best = -std::log1p(-found.phi);  // in z = -ln(1 - phi), as it was found
+  const double spread = std::sqrt(found.phi_variance) / (1.0 - found.phi);
+  const double step = spread > 0.0 ? std::clamp(kStep * spread, kLeastStep, kMostStep) : kMostStep;
+  std::vector<PossibleAutoregression> points;
+  double sum = 0.0;
+  // False where nothing beyond counts.
+  const auto add = [&](double z) {
+    const double phi = -std::expm1(-z);
+    const Whitened w = likelihood.at(phi);
+    const double above = w.criterion - found.criterion;
+    if (!(above < kNegligible)) return false;
+    // d phi = exp(-z) dz
+    points.push_back({phi, std::exp(-0.5 * above - z), w.squares / freedom});
+    sum += points.back().weight;
+    return true;
+  };
+  for (double z = best; z <= end && add(z); z += step) {
+  }
+  for (double z = best - step; z >= 0.0 && add(z); z -= step) {
+  }
+  for (PossibleAutoregression& p : points) p.weight /= sum;
+  return points;
 }
 
 double satterthwaite_degrees(const AutoregressionEstimate& estimate, Eigen::Index column,

@@ -63,6 +63,23 @@ struct AutoregressionEstimate {
                                                              const Eigen::MatrixXd& jacobian,
                                                              double step_s);
 
+/// One phi among those that residuals leave possible.
+struct PossibleAutoregression {
+  double phi = 0.0;
+  double weight = 0.0;    ///< of this phi; those of all sum to 1
+  double variance = 0.0;  ///< marginal, of one reading, at this phi
+};
+
+/// The phi that residuals leave possible: points across the restricted likelihood, weighted by it,
+/// all phi from 0 to 0.999 being equally likely before. An interval at the most likely phi alone is
+/// too narrow where few readings tell phi: the variance of an estimate grows with
+/// (1 + phi)/(1 - phi), and where phi came out small by chance the expansion about it
+/// (satterthwaite_degrees) also states too small an uncertainty of this variance.
+/// @param found by estimate_autoregression() from the same residuals
+[[nodiscard]] std::vector<PossibleAutoregression> possible_autoregressions(
+    std::span<const double> time_s, const Eigen::VectorXd& residual,
+    const Eigen::MatrixXd& jacobian, double step_s, const AutoregressionEstimate& found);
+
 /// Degrees of freedom of Student's t for an estimate whose variance rests on an estimated phi and
 /// an estimated size of the noise (Satterthwaite, as Kenward & Roger, Biometrics 53 (1997) 983):
 /// 2 / Var(ln v), Var(ln v) = slope^2 Var(phi) + 2/(n - p). Throws std::logic_error for a column

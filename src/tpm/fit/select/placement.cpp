@@ -1,17 +1,16 @@
 #include "tpm/fit/select/placement.hpp"
 
-#include <Eigen/Cholesky>
 #include <Eigen/QR>
 #include <algorithm>
 #include <cmath>
 
-#include "tpm/base/distributions.hpp"
 #include "tpm/base/median.hpp"
 #include "tpm/base/namespaces.hpp"
 #include "tpm/fit/adequacy.hpp"
 #include "tpm/fit/autoregressive.hpp"
 #include "tpm/fit/likelihood/load_imposed.hpp"
 #include "tpm/fit/select/pull_after_withdrawal.hpp"
+#include "tpm/fit/select/rest_line.hpp"
 
 namespace tpm::fit {
 namespace {
@@ -165,27 +164,6 @@ RestSamples averaged(RestSamples rest) {
   return few;
 }
 
-double middle_of_rest(std::span<const double> values) {
-  double sum = 0.0;
-  for (const double v : values) sum += v;
-  return sum / static_cast<double>(values.size());
-}
-
-constexpr double kFewestDegrees = 2.5;
-
-/// Standard deviation of a normal distribution as wide as Student's t.
-double students(double sd, double degrees) {
-  const double f = std::max(degrees, kFewestDegrees);
-  return sd * std::sqrt(f / (f - 2.0));
-}
-
-/// Upper end of the 95 % interval of an estimated standard deviation.
-double upper_end(double sd, double degrees) {
-  constexpr double kBeyond = 0.025;
-  const double f = std::max(degrees, kFewestDegrees);
-  return sd * std::sqrt(f / chi_squared_quantile(kBeyond, f));
-}
-
 /// Rounding hides what is smaller than a step.
 double rounding_sd(const PreparedRecording& r) {
   constexpr double kLeast = 1e-9;  // of the peak: rounding of numbers
@@ -193,16 +171,6 @@ double rounding_sd(const PreparedRecording& r) {
   const double stated = r.instrument ? r.instrument->reading_floor() : 0.0;
   return std::max({quantum / std::sqrt(12.0), stated, kLeast * std::abs(r.phases.peak_response)});
 }
-
-/// The longest hold, about a straight line and four exponentials: a short rest does not tell how
-/// its readings are correlated.
-struct HoldSamples {
-  std::vector<double> time_s;
-  Eigen::VectorXd reading;
-  Eigen::MatrixXd curve;
-  double step_s = 0.0;    ///< of samples, which phi belongs to
-  double variance = 0.0;  ///< of the noise
-};
 
 std::optional<HoldSamples> hold_samples(const PreparedRecording& r) {
   constexpr std::size_t kFewest = 50, kMost = 1000;
@@ -254,25 +222,6 @@ std::optional<HoldSamples> hold_samples(const PreparedRecording& r) {
   return HoldSamples{std::move(kept_time), reading, curve, step_s, variance};
 }
 
-/// The noise of the rests and the hold together, each about its own curve.
-/// @param line of the rests: the first columns of the estimate
-AutoregressionEstimate common_noise(const RestSamples& rest, const Eigen::VectorXd& reading,
-                                    const Eigen::MatrixXd& line, const HoldSamples& hold) {
-  const auto before = std::ranges::lower_bound(rest.time_s, hold.time_s.front());
-  std::vector<double> time_s(rest.time_s.begin(), before);
-  time_s.insert(time_s.end(), hold.time_s.begin(), hold.time_s.end());
-  time_s.insert(time_s.end(), before, rest.time_s.end());
-  const auto first = static_cast<Eigen::Index>(before - rest.time_s.begin());
-  const Eigen::Index held = hold.reading.size(), last = reading.size() - first, p = line.cols();
-  Eigen::VectorXd y(first + held + last);
-  y << reading.head(first), hold.reading, reading.tail(last);
-  Eigen::MatrixXd j = Eigen::MatrixXd::Zero(y.size(), p + hold.curve.cols());
-  j.topLeftCorner(first, p) = line.topRows(first);
-  j.block(first, p, held, hold.curve.cols()) = hold.curve;
-  j.bottomLeftCorner(last, p) = line.bottomRows(last);
-  return estimate_autoregression(time_s, y, j, hold.step_s);
-}
-
 /// What rests say, and the standard deviations of zero and drift at the upper end of the 95 %
 /// interval of the noise.
 struct RestEstimate {
@@ -280,61 +229,21 @@ struct RestEstimate {
   double zero_limit = 0.0, drift_limit = 0.0;
 };
 
-/// Generalised least squares of a line (or a level) through readings at rest.
+/// A line (below 8 samples a level) through readings at rest.
 /// @param hold whose noise is that of the rests
 void fit_rests(const RestSamples& rest, double rounding, const std::optional<HoldSamples>& hold,
                RestEstimate& estimate) {
-  const auto n = static_cast<Eigen::Index>(rest.reading.size());
-  const Eigen::Index p = rest.reading.size() >= kFewestForSlope ? 2 : 1;
-  const double middle = middle_of_rest(rest.time_s);
-  const double length = rest.time_s.back() - rest.time_s.front();
-  Eigen::MatrixXd j(n, p);
-  Eigen::VectorXd y(n);
-  const double level = middle_of_rest(rest.reading);
-  for (Eigen::Index i = 0; i < n; ++i) {
-    const auto k = static_cast<std::size_t>(i);
-    j(i, 0) = 1.0;
-    if (p > 1) j(i, 1) = (rest.time_s[k] - middle) / length;
-    y[i] = rest.reading[k] - level;
-  }
-  const double step_s = hold ? hold->step_s : median_step(rest.time_s);
-  const AutoregressionEstimate noise =
-      hold ? common_noise(rest, y, j, *hold) : estimate_autoregression(rest.time_s, y, j, step_s);
-  const Eigen::Index samples = n + (hold ? hold->reading.size() : 0);
-  const Eigen::Index columns = p + (hold ? hold->curve.cols() : 0);
-  Eigen::MatrixXd whitened(n, p + 1);
-  whitened << j, y;
-  AutoregressiveNoise(noise.phi, step_s).whiten(rest.time_s, whitened);
-  const Eigen::MatrixXd gram = whitened.leftCols(p).transpose() * whitened.leftCols(p);
-  const Eigen::MatrixXd inverse = gram.llt().solve(Eigen::MatrixXd::Identity(p, p));
-  const Eigen::VectorXd x = inverse * (whitened.leftCols(p).transpose() * whitened.col(p));
-  const Eigen::MatrixXd covariance = noise.variance * inverse;
+  const bool sloped = rest.reading.size() >= kFewestForSlope;
+  const RestLine line =
+      fit_rest_line(rest.time_s, rest.reading, sloped, rounding, hold ? &*hold : nullptr);
   RestReadings& result = estimate.readings;
-  result.phi = noise.phi;
-  result.noise_sd = std::sqrt(noise.variance);
-  const auto degrees = [&](Eigen::Index column) {
-    return satterthwaite_degrees(noise, column, samples, columns);
-  };
-  const auto sd = [&](Eigen::Index column, double variance) {
-    return std::hypot(students(std::sqrt(variance), degrees(column)), rounding);
-  };
-  const auto limit = [&](Eigen::Index column, double variance) {
-    return std::hypot(upper_end(std::sqrt(variance), degrees(column)), rounding);
-  };
-  if (p == 1) {
-    result.origin_s = middle;
-    result.zero = Measured{level + x[0], sd(0, covariance(0, 0))};
-    estimate.zero_limit = limit(0, covariance(0, 0));
-    return;
-  }
-  const double shift = -covariance(0, 1) / covariance(1, 1);  // of the origin, in lengths
-  result.origin_s = middle + shift * length;
-  const double at_origin =
-      covariance(0, 0) - covariance(0, 1) * covariance(0, 1) / covariance(1, 1);
-  result.zero = Measured{level + x[0] + shift * x[1], sd(0, at_origin)};
-  result.drift = Measured{x[1] / length, sd(1, covariance(1, 1)) / length};
-  estimate.zero_limit = limit(0, at_origin);
-  estimate.drift_limit = limit(1, covariance(1, 1)) / length;
+  result.phi = line.phi;
+  result.noise_sd = line.noise_sd;
+  result.origin_s = line.origin_s;
+  result.zero = line.zero;
+  result.drift = line.slope;
+  estimate.zero_limit = line.zero_limit;
+  estimate.drift_limit = line.slope_limit;
 }
 
 RestEstimate estimate_rests(const PreparedRecording& recording) {

@@ -39,7 +39,9 @@ struct RestReadings {
 /// The noise of a rest below 100 samples is estimated together with that of the longest hold, if
 /// that has more: about a line, and about a line and four exponentials.
 /// Both are multiplied by sqrt(f / (f - 2)), f the degrees of freedom of their variance: the
-/// standard deviation of Student's t. A rest of more than 1,000 samples is averaged in blocks.
+/// standard deviation of Student's t. Where the correlation is significant their intervals count
+/// every phi that the readings leave possible instead (fit_rest_line). A rest of more than 1,000
+/// samples is averaged in blocks.
 [[nodiscard]] RestReadings read_rests(const PreparedRecording& recording);
 
 /// The level of the readings while the strain, or the stress that is imposed, rests at 0 before it
