@@ -146,3 +146,77 @@ TEST_CASE("units are compared without their capitals only within fitting dimensi
   CHECK(units_in_any_case("mn", forces) == std::vector<std::string>{"mN", "MN"});
   CHECK(units_in_any_case("volt", forces).empty());
 }
+
+TEST_CASE("titles and units are read in comments, which name no columns otherwise") {
+  const auto read = [](const std::string& comments, const std::string& separator) {
+    const test::TempFolder folder;
+    std::string text = comments;
+    for (int i = 0; i <= 20; ++i) {
+      text += fmt::format("{1}{0}{2}{0}{3}\n", separator, i, 2 * i, 3 * i);
+    }
+    write_file(folder / "t.dat", text);
+    return read_recording_file(folder / "t.dat", {});
+  };
+  for (const auto& [comments, separator] : {
+           std::pair{"% exported 2023-05-11\n% operator AB\n%\n% columns: time, depth, force\n"
+                     "% units: s, mm, N\n",
+                     "  "},
+           std::pair{"# Columns: Time (s), Depth (mm), Force (N)\n# operator AB\n", "  "},
+           std::pair{"# operator AB\n# 1: time [s]\n# 2: depth [mm]\n# 3: force [N]\n", "\t"},
+           std::pair{"% column 1 = time (s)\n% column 2 = depth (mm)\n% column 3 = force (N)\n",
+                     ","},
+           std::pair{"; time depth force\n; s mm N\n;---\n", " "},
+           std::pair{"// operator AB\n// Time (s); Depth (mm); Force (N)\n", "\t"},
+       }) {
+    CAPTURE(comments);
+    const Recording r = read(comments, separator).recording;
+    CHECK(r.time_s.back() == 20.0);
+    CHECK_THAT(r.drive.back(), WithinRel(40e-3, 1e-12));
+    CHECK(r.response.back() == 60.0);
+  }
+  // Comments that say nothing are no titles.
+  const std::string refusal =
+      test::refusal_of([&] { static_cast<void>(read("% exported\n% operator AB\n", "  ")); });
+  CHECK_THAT(refusal, !Contains("AB") && Contains("no titles above its 3 columns") &&
+                          Contains("--time 1 --drive 2 --response 3 --unit 1=s"));
+}
+
+TEST_CASE("columns of logarithms are refused by their titles") {
+  for (const char* titles : {"log w,log G',log G''", "log10(omega);log10(G');log10(G'')",
+                             "lg f / Hz,lg E' / Pa,lg E'' / Pa", "ln t,ln force,ln depth"}) {
+    CAPTURE(titles);
+    CHECK_THAT(refusal_of_titles(titles),
+               Contains("logarithms, by their titles") && Contains("10 to the power of"));
+  }
+  // The time of a log is one column, and plain columns beside logarithms are read.
+  CHECK(read_titled("Log time (s),Depth (mm),Force (N)").recording.time_s.back() == 20.0);
+}
+
+TEST_CASE("a column that was logged at a lower rate is read where it has numbers") {
+  const auto read = [](const auto& depth_at, const auto& force_at) {
+    const test::TempFolder folder;
+    std::string text = "Time (s),Depth (mm),Force (N)\n";
+    for (int i = 0; i < 200; ++i) {
+      text += fmt::format("{},{},{}\n", i, depth_at(i) ? std::to_string(2 * i) : "",
+                          force_at(i) ? std::to_string(3 * i) : "NaN");
+    }
+    write_file(folder / "t.csv", text);
+    return read_recording_file(folder / "t.csv", {});
+  };
+  const auto always = [](int) { return true; };
+  const auto quarter = [](int i) { return i % 4 == 0; };
+  CHECK(read(quarter, always).recording.response.size() == 50);
+  CHECK(read(always, quarter).recording.drive.size() == 50);
+  for (const auto& refused : {
+           test::refusal_of([&] {  // in turn
+             static_cast<void>(
+                 read([](int i) { return i % 2 == 0; }, [](int i) { return i % 2 == 1; }));
+           }),
+           test::refusal_of([&] {  // a mark now and then
+             static_cast<void>(read([](int i) { return i < 5 || i % 60 == 0; }, always));
+           }),
+       }) {
+    CHECK_THAT(refused, Contains("t.csv:") && Contains("empty where a number belongs, as") &&
+                            Contains("of 200 rows are") && Contains("interpolated"));
+  }
+}

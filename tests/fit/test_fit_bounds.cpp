@@ -6,6 +6,7 @@
 #include <cmath>
 #include <optional>
 
+#include "support/creep_recordings.hpp"
 #include "support/remarks.hpp"
 #include "tpm/base/random.hpp"
 #include "tpm/fit/select/selection.hpp"
@@ -241,4 +242,70 @@ TEST_CASE("A rest before contact keeps contact and offset off their bounds", "[b
     CHECK(named(fit, "tau1").conditional_on.empty());
   }
   CHECK(on_bound == 0);
+}
+
+TEST_CASE("The strain without a load of creep has physical bounds, which nothing widens",
+          "[bounds]") {
+  test::CreepTrial trial;
+  trial.rest_s = 4.0;
+  trial.strain_zero = 2e-3;
+  const PreparedRecording r = prepare_recording("creep.csv", test::creep_recording_of(trial));
+  REQUIRE(r.load_imposed);
+  const FitConfig config = recording_config(parse_law_name("linear-1", "test"), {&r, 1}, {});
+  const auto zero = std::ranges::find_if(config.parameters,
+                                         [](const auto& p) { return p.fit.name == "strain_zero"; });
+  REQUIRE(zero != config.parameters.end());
+  CHECK_FALSE(zero->widest);
+  CHECK(zero->fit.lower < trial.strain_zero);
+  CHECK(zero->fit.upper > trial.strain_zero);
+  // Every strain under the stress lies beyond it.
+  double least = 1.0;
+  for (std::size_t i = 0; i < r.recording.time_s.size(); ++i) {
+    if (r.recording.drive[i] > 0.5 * trial.stress_Pa) {
+      least = std::min(least, r.recording.response[i]);
+    }
+  }
+  CHECK(zero->fit.upper < least + 5.0 * trial.noise);
+}
+
+TEST_CASE("The zero of a stress is not moved further than what was read", "[bounds]") {
+  Recording pulled;
+  pulled.drive_quantity = Quantity::strain;
+  pulled.response_quantity = Quantity::stress;
+  for (int i = 0; i < 200; ++i) {
+    const double t = 0.05 * i;
+    pulled.time_s.push_back(t);
+    pulled.drive.push_back(std::min(0.1, 0.1 * t));
+    pulled.response.push_back(1e3 * pulled.drive.back() * (1.0 + 0.5 * std::exp(-t / 2.0)));
+  }
+  const PreparedRecording r = prepare_recording("pulled.csv", pulled);
+  const FitConfig config = recording_config(parse_law_name("linear-1", "test"), {&r, 1}, {});
+  const auto offset =
+      std::ranges::find_if(config.parameters, [](const auto& p) { return p.fit.name == "offset"; });
+  REQUIRE(offset != config.parameters.end());
+  CHECK_FALSE(offset->widest);
+}
+
+TEST_CASE("Creep under a load that was on before the recording is refused", "[bounds]") {
+  const auto weight = [](double noise_N, bool pressed) {
+    Recording r;
+    Random random(3);
+    for (int i = 0; i < 300; ++i) {
+      const double t = 0.1 * i;
+      r.time_s.push_back(t);
+      r.drive.push_back(3e-3 + 1e-3 * (1.0 - std::exp(-t / 4.0)) + 1e-6 * random.normal());
+      r.response.push_back((pressed ? 20.0 * r.drive.back() : 0.3) + noise_N * random.normal());
+    }
+    const std::vector<PreparedRecording> one{prepare_recording("weight.csv", r)};
+    static_cast<void>(recording_config(parse_law_name("linear-1", "test"), one, {}));
+  };
+  for (const double noise_N : {0.0, 1e-4}) {
+    CAPTURE(noise_N);
+    CHECK_THROWS_WITH(weight(noise_N, false),
+                      Contains("creep under a load that was on before") &&
+                          Contains("how far it went before is unknown") &&
+                          Contains("the recording from before the load on"));
+  }
+  // A force that follows the depth is no kept load.
+  CHECK_NOTHROW(weight(1e-4, true));
 }

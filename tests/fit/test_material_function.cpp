@@ -1,6 +1,7 @@
 // Spectra, relaxation moduli and creep compliances, fitted without a configuration.
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <catch2/catch.hpp>
 #include <cmath>
 #include <numbers>
@@ -225,6 +226,69 @@ TEST_CASE("Small readings that scatter by more than their share do not rule a fi
   CHECK_FALSE((chosen(s).adequacy && chosen(s).adequacy->is_rejected()));
   const bool in_order = estimate_of(chosen(s), "tau1") < estimate_of(chosen(s), "tau2");
   CHECK_THAT(estimate_of(chosen(s), in_order ? "tau2" : "tau1"), WithinRel(9.0, 0.06));
+}
+
+namespace {
+
+/// A relaxation modulus read with 1 % noise and 2 Pa of the instrument's.
+/// @param seen what the instrument makes of it
+template <typename Modulus, typename Seen>
+Selection read_with_floor(const Modulus& modulus_at, const Seen& seen, double until_s = 200.0) {
+  const test::TempFolder folder;
+  std::string text = "t [s],G(t) [Pa]\n";
+  base::Random random(5);
+  for (const double t : decades_of(0.01, until_s, 90)) {
+    const double g = modulus_at(t) * (1.0 + 0.01 * random.normal()) + 2.0 * random.normal();
+    text += fmt::format("{:.6g},{:.6g}\n", t, seen(g));
+  }
+  write_file(folder / "g.csv", text);
+  return select_law(read_function(folder / "g.csv"), quick());
+}
+
+double fluid_modulus(double t) {
+  return 3200.0 * std::exp(-t / 1.5) + 700.0 * std::exp(-t / 9.0);
+}
+
+double solid_modulus(double t) {
+  return 300.0 + 1500.0 * std::exp(-t / 2.0);
+}
+
+/// True if a lasting stiffness is claimed.
+bool claims_plateau(const Selection& s) {
+  return std::ranges::any_of(chosen(s).parameters, [](const ParameterResult& p) {
+    return p.parameter.name == "k_inf" && p.verdict == Verdict::identified && !p.not_separable;
+  });
+}
+
+}  // namespace
+
+TEST_CASE("An instrument that reads no negative values makes no lasting stiffness") {
+  // The readings of a fluid end at the size of the noise, never below 0.
+  const Selection fluid = read_with_floor(fluid_modulus, [](double g) { return std::abs(g); });
+  CHECK_FALSE(claims_plateau(fluid));
+  // Nor does a curve that ends before a plateau is seen.
+  const auto early = [](double t) { return fluid_modulus(t) + 3.0; };
+  CHECK_FALSE(claims_plateau(read_with_floor(
+      early, [](double g) { return g; }, 36.0)));
+  // What stands high above the noise is a plateau.
+  const Selection solid = read_with_floor(solid_modulus, [](double g) { return std::abs(g); });
+  CHECK(claims_plateau(solid));
+  CHECK_THAT(estimate_of(chosen(solid), "k_inf"), WithinRel(300.0, 0.02));
+}
+
+TEST_CASE("Readings that stand at the least value of an instrument are left out") {
+  const Selection s = read_with_floor(fluid_modulus, [](double g) { return std::max(g, 4.0); });
+  CHECK(std::ranges::any_of(s.remarks,
+                            [](const Remark& r) { return r.code == "floor_of_instrument"; }));
+  CHECK(std::isfinite(chosen(s).config.data.front().to_s));
+  CHECK_FALSE(claims_plateau(s));
+  const bool in_order = estimate_of(chosen(s), "tau1") < estimate_of(chosen(s), "tau2");
+  CHECK_THAT(estimate_of(chosen(s), in_order ? "tau2" : "tau1"), WithinRel(9.0, 0.06));
+  // A plateau of rounded readings is no floor.
+  const Selection rounded = read_with_floor([](double t) { return solid_modulus(t); },
+                                            [](double g) { return std::round(g / 10.0) * 10.0; });
+  CHECK(std::ranges::none_of(rounded.remarks,
+                             [](const Remark& r) { return r.code == "floor_of_instrument"; }));
 }
 
 TEST_CASE("A sweep with the inertia of the instrument is not described by a law of tissue") {

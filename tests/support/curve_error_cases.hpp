@@ -85,6 +85,17 @@ inline std::vector<ErrorCase> curve_json_cases() {
   };
 }
 
+/// 50 rows, each of which lacks one of two columns.
+inline std::string rows_in_turn() {
+  constexpr int kRows = 50;
+  std::string rows;
+  for (int i = 0; i < kRows; ++i) {
+    const std::string number = std::to_string(i);
+    rows += i % 2 == 0 ? number + "," + number + ",\n" : number + ",," + number + "\n";
+  }
+  return rows;
+}
+
 inline std::vector<ErrorCase> machine_cases() {
   const std::string type = "machine export";
   const std::string import = "data import {}/m.csv -o {}/out";
@@ -149,6 +160,12 @@ inline std::vector<ErrorCase> machine_cases() {
        machine(head + "0,0,0\n1,-1,1\n2,-2,2\n3,-3,3\n4,-3,3\n")},
       {type, "only a hold", "fit {}/m.csv --no-draw",
        machine(head + "0,3,1\n1,2,1\n2,1.5,1\n3,1.2,1\n4,1,1\n")},
+      {type, "no titles", import, machine("0,0,0\n1,1,1\n2,2,2\n")},
+      {type, "logarithms", import, machine("log w,log G',log G''\n0,0,0\n1,1,1\n2,2,2\n")},
+      {type, "columns logged in turn", import, machine(head + rows_in_turn())},
+      {type, "load that was on before", "fit {}/m.csv --no-draw",
+       machine(head + "0,3,1\n1,3,1.5\n2,3,1.8\n3,3,1.9\n4,3,1.95\n5,3,1.97\n6,3,1.98\n7,3,1.99\n"
+                      "8,3,2\n")},
       {type, "binary garbage", import, machine(kGarbage)},
       {type, "100 MB line", import, machine(long_line())},
   };

@@ -137,7 +137,10 @@ std::string range_words(const ParameterResult& p, double level) {
         return fmt::format(
             "{} = {} is not identified: {}: not separable; {} interval without {} {}", f.name,
             in_sized_unit(p, p.estimate), p.not_separable->text, percent(level),
-            p.not_separable->code == kDriftOrBranch ? "drift" : "such a branch", interval);
+            p.not_separable->code == kDriftOrBranch     ? "drift"
+            : p.not_separable->code == kPlateauOrBranch ? "such a branch"
+                                                        : "such a floor",
+            interval);
       }
       if (p.unconfirmed) {
         return fmt::format("{} = {} is not identified: {}; {} interval of this minimum {}", f.name,

@@ -33,6 +33,8 @@ namespace tpm::fit {
 
 /// Code of ParameterResult::not_separable where no rest tells a drift of the zero.
 inline constexpr const char* kDriftOrBranch = "drift_or_slow_branch";
+inline constexpr const char* kPlateauOrBranch = "plateau_or_slower_branch";
+inline constexpr const char* kPlateauOrFloor = "plateau_or_floor";
 
 /// "eta1 = 5 Pa s is excluded by these data (...)" or "undetermined ...".
 [[nodiscard]] std::string hypothesis_words(const HypothesisResult& result, double level);

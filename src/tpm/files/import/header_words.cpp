@@ -437,6 +437,12 @@ std::optional<RefusedTitle> refused_title(std::string_view name) {
   return RefusedTitle{*known, fmt::format("'{}' {}", refused->word, refused->why), refused->asked};
 }
 
+bool is_logarithm(std::string_view name) {
+  constexpr auto kLogarithms = std::to_array<std::string_view>({"log", "log10", "lg", "ln"});
+  const std::vector<std::string> words = words_of(spelled_out(name));
+  return words.size() > 1 && std::ranges::find(kLogarithms, words.front()) != kLogarithms.end();
+}
+
 bool is_angular(std::string_view name) {
   const std::vector<std::string> words = words_of(spelled_out(name));
   return has_word(words, "omega") || has_word(words, "angular") || has_word(words, "kreisfrequenz");

@@ -46,6 +46,9 @@ struct RefusedTitle {
 /// True if numbers in this dimension can be what a title says.
 [[nodiscard]] bool is_dimension_of(const Recognized& meaning, Dimension dimension);
 
+/// True for "log w", "lg G'", "ln(G)", "log10(omega)".
+[[nodiscard]] bool is_logarithm(std::string_view name);
+
 /// True for an angular frequency ("omega", "angular frequency", "Kreisfrequenz"): there 1/s means
 /// rad/s.
 [[nodiscard]] bool is_angular(std::string_view name);

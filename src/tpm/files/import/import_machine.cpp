@@ -6,6 +6,7 @@
 #include <array>
 #include <cctype>
 #include <cmath>
+#include <iterator>
 #include <tuple>
 
 #include "tpm/base/namespaces.hpp"
@@ -109,8 +110,22 @@ class SeriesReader {
         "blank", fmt::format("{} in these columns", lines_of(table_, end_, all))));
   }
 
+  static constexpr std::size_t kFewestForASlowerColumn = 20;
+
+  /// A column that was logged at a lower rate: enough complete rows, equally many rows apart.
+  static bool is_slower_column(const std::vector<std::size_t>& complete) {
+    constexpr std::size_t kTimes = 2;
+    if (complete.size() < kFewestForASlowerColumn) return false;
+    std::size_t least = complete[1] - complete[0], most = least;
+    for (std::size_t i = 2; i < complete.size(); ++i) {
+      least = std::min(least, complete[i] - complete[i - 1]);
+      most = std::max(most, complete[i] - complete[i - 1]);
+    }
+    return most <= kTimes * least;
+  }
+
   /// A sample that was lost is an empty cell, "NaN", "null" or "---". Where most rows have one, the
-  /// column is none.
+  /// column is none, unless it was logged at a lower rate.
   void leave_out_missing_readings(const std::vector<Use>& uses) {
     const auto missing = [&](std::size_t i) {
       return std::ranges::any_of(uses, [&](const Use& use) {
@@ -125,12 +140,26 @@ class SeriesReader {
     };
     const auto first = std::ranges::find_if(rows_, missing);
     const auto count = static_cast<std::size_t>(std::ranges::count_if(rows_, missing));
-    if (count == 0 || 2 * count >= rows_.size()) return;
+    if (count == 0) return;
     const DelimitedRow& row = table_.rows[*first];
     const auto lost = std::ranges::find_if(uses, [&](const Use& use) {
       const std::string_view field = field_at(row, use.column->index);
       return use.clock ? field.empty() : !find_styled_number(field, header_.style);
     });
+    if (2 * count >= rows_.size()) {
+      std::vector<std::size_t> complete;
+      std::ranges::copy_if(rows_, std::back_inserter(complete),
+                           [&](auto i) { return !missing(i); });
+      if (count < kFewestForASlowerColumn) return;  // whoever reads the cells refuses them
+      if (!is_slower_column(complete)) {
+        throw bad_input(
+            lost == uses.end() ? fmt::format("{}:{}", file_, row.line)
+                               : fmt::format("{}:{}: {}", file_, row.line, lost->column->label()),
+            fmt::format("empty where a number belongs, as {} of {} rows are", count, rows_.size()),
+            "a number in each column of each row: columns that were logged in turn, interpolated "
+            "to the times of one of them");
+      }
+    }
     missing_ = fmt::format("{} of {} rows have an empty cell or NaN, from line {} on{}: left out",
                            count, rows_.size(), row.line,
                            lost == uses.end() ? "" : fmt::format(" ({})", lost->column->label()));
@@ -330,6 +359,15 @@ std::vector<Use> recording_uses(const DelimitedTable& table, const MachineHeader
   if (response == nullptr) {
     require_not_refused(choice, ColumnRole::response, file, "--response");
     require_no_other_sweep(choice, file);
+    const bool titled = std::ranges::any_of(
+        header.columns, [](const MachineColumn& column) { return !column.name.empty(); });
+    if (!titled && drive == nullptr && header.columns.size() > 2) {
+      throw bad_input(
+          file, fmt::format("no titles above its {} columns", header.columns.size()),
+          "titles with units in the first line, such as Time (s), Depth (mm) and Force (N), or "
+          "the number and the unit of each column: --time 1 --drive 2 --response 3 --unit 1=s "
+          "--unit 2=mm --unit 3=N, if they are these");
+    }
     throw bad_input(file, "no column is recognised as a force, stress, modulus or compliance",
                     fmt::format("--response with one of {}", choice.list()));
   }

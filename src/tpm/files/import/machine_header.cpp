@@ -4,11 +4,12 @@
 
 #include <algorithm>
 #include <array>
-#include <cctype>
+#include <utility>
 
 #include "tpm/base/namespaces.hpp"
 #include "tpm/base/text.hpp"
 #include "tpm/files/import/column_title.hpp"
+#include "tpm/files/import/header_comments.hpp"
 #include "tpm/files/import/machine_columns.hpp"
 #include "tpm/files/unit_words.hpp"
 #include "tpmkit/error.hpp"
@@ -168,32 +169,72 @@ std::vector<std::string> title_cells(const DelimitedTable& table,
   return {fields.begin(), fields.end()};
 }
 
-std::vector<std::string_view> cut_comment(std::string_view text, char separator) {
-  std::vector<std::string_view> fields;
-  text.remove_prefix(text.find_first_not_of("# \t"));
-  while (true) {
-    const auto end = separator == ' ' ? text.find_first_of(" \t") : text.find(separator);
-    const std::string_view field = text.substr(0, end);
-    if (separator != ' ' || !field.empty()) fields.push_back(field);
-    if (end == std::string_view::npos) return fields;
-    text.remove_prefix(end + 1);
+/// The cells of a comment, whose marks may be others than those between the numbers.
+std::vector<std::string> comment_cells(const DelimitedTable& table, std::string_view text,
+                                       std::size_t width) {
+  text = without_label(text);
+  for (const char separator : {',', ';', '\t'}) {
+    std::vector<std::string> cells;
+    for (const std::string_view field : cut_comment(text, separator)) {
+      cells.emplace_back(trimmed(field));
+    }
+    const bool filled =
+        std::ranges::none_of(cells, [](const std::string& cell) { return cell.empty(); });
+    if (width > 1 && cells.size() == width && filled) return cells;
   }
+  return title_cells(table, cut_comment(text, table.separator), width);
+}
+
+/// Titles that comments number one by one, each column once; none otherwise.
+std::optional<HeaderRow> numbered_titles(const std::vector<std::pair<int, std::string>>& comments,
+                                         std::size_t width) {
+  HeaderRow row{0, std::vector<std::string>(width), true};
+  std::size_t found = 0;
+  for (const auto& [line, text] : comments) {
+    const auto one = numbered_title(text);
+    if (!one || one->number == 0 || one->number > width) continue;
+    std::string& cell = row.cells[one->number - 1];
+    if (!cell.empty()) return std::nullopt;
+    cell = one->title;
+    row.line = line;
+    ++found;
+  }
+  return found == width ? std::optional(std::move(row)) : std::nullopt;
+}
+
+std::string joined_fields(const DelimitedTable& table, const DelimitedRow& row) {
+  return fmt::format("{}", fmt::join(row.fields, std::string(1, table.separator)));
 }
 
 /// The rows above a block, comments of the file among them, in the order of their lines.
 std::vector<HeaderRow> rows_above(const DelimitedTable& table, const SampleBlock& block) {
   std::vector<HeaderRow> rows;
+  std::vector<std::pair<int, std::string>> comments;
   for (std::size_t i = block.header_first; i < block.first; ++i) {
-    rows.push_back({table.rows[i].line, title_cells(table, table.rows[i].fields, block.width)});
+    const DelimitedRow& row = table.rows[i];
+    HeaderRow read{row.line, title_cells(table, row.fields, block.width)};
+    const std::string text = joined_fields(table, row);
+    const auto comment = behind_comment_mark(text, table.separator);
+    // "% kPa" may be the units of a strain and a stress.
+    if (comment && !is_unit_row(read)) {
+      comments.emplace_back(row.line, *comment);
+      continue;
+    }
+    rows.push_back(std::move(read));
   }
   const int from = block.header_first == 0 ? 0 : table.rows[block.header_first - 1].line;
   const int to = table.rows[block.first].line;
   for (const DelimitedComment& comment : table.comments) {
     if (comment.line < from || comment.line > to) continue;
-    if (comment.text.find_first_not_of("# \t") == std::string::npos) continue;
-    const auto fields = cut_comment(comment.text, table.separator);
-    rows.push_back({comment.line, title_cells(table, fields, block.width), true});
+    const auto begin = comment.text.find_first_not_of("# \t");
+    if (begin != std::string::npos) {
+      comments.emplace_back(comment.line, comment.text.substr(begin));
+    }
   }
+  for (const auto& [line, text] : comments) {
+    rows.push_back({line, comment_cells(table, text, block.width), true});
+  }
+  if (auto titles = numbered_titles(comments, block.width)) rows.push_back(*std::move(titles));
   std::stable_sort(rows.begin(), rows.end(),
                    [](const HeaderRow& a, const HeaderRow& b) { return a.line < b.line; });
   return rows;
@@ -222,6 +263,16 @@ MachineColumn described_column(std::size_t index, const HeaderRows& rows,
   return column;
 }
 
+/// Two or more columns of logarithms are no measured quantities. "Log time" alone may be the time
+/// of a log.
+void take_meaning_of_logarithms(std::vector<MachineColumn>& columns) {
+  const auto is_log = [](const MachineColumn& column) { return is_logarithm(column.title); };
+  if (std::ranges::count_if(columns, is_log) < 2) return;
+  for (MachineColumn& column : columns) {
+    if (is_log(column)) column.meaning.reset();
+  }
+}
+
 /// What the rows above a block say of its columns.
 void describe_columns(const DelimitedTable& table, const SampleBlock& block, MachineHeader& header,
                       const ImportOptions& options) {
@@ -246,6 +297,7 @@ void describe_columns(const DelimitedTable& table, const SampleBlock& block, Mac
     doubt_unit(column);
   }
   recognize_lone_columns(header.columns);
+  take_meaning_of_logarithms(header.columns);
   header.rows = block.first;
   header.block = block;
 }
@@ -367,6 +419,27 @@ void require_titles_for_fields(const DelimitedTable& table, const MachineHeader&
       "another separator than the comma, numbers in quotes, or a title for each column");
 }
 
+/// Refuses a table whose quantities stand there as logarithms only, unless columns are chosen.
+void require_no_logarithms(const MachineHeader& header, const std::string& file,
+                           const ImportOptions& options) {
+  const bool chosen = std::ranges::any_of(
+      std::to_array({&options.time_column, &options.drive_column, &options.response_column,
+                     &options.frequency_column, &options.storage_column, &options.loss_column}),
+      [](const std::string* selector) { return !selector->empty(); });
+  if (chosen || is_understood(header)) return;
+  std::string logarithms;
+  std::size_t count = 0;
+  for (const MachineColumn& column : header.columns) {
+    if (!is_logarithm(column.title)) continue;
+    logarithms += fmt::format("{}{}", count == 0 ? "" : ", ", column.label());
+    ++count;
+  }
+  if (count < 2) return;
+  throw bad_input(file, fmt::format("{}: logarithms, by their titles", printable(logarithms, 200)),
+                  "the quantities themselves (10 to the power of each number, or e for ln), with "
+                  "their units in the titles, such as 'omega (rad/s)' and 'G' (Pa)'");
+}
+
 NumberStyle style_of(const DelimitedTable& table, const MachineHeader& header,
                      const std::string& file, const ImportOptions& options) {
   std::vector<StyledColumn> columns;
@@ -397,6 +470,7 @@ MachineHeader read_machine_header(const DelimitedTable& table, const std::string
     block = chosen_block(table, file, options, all, header);
   }
   describe_columns(table, block, header, options);
+  require_no_logarithms(header, file, options);
   require_titles_for_fields(table, header, file);
   tell_unread_rows(table, all, header);
   header.style = style_of(table, header, file, options);

@@ -216,9 +216,11 @@ void add_range_remarks(LawPrediction& p, const LawFile& law) {
     }
     for (const std::string& name : law.uncertainty->not_separable) {
       p.remarks.push_back(
-          {"drift_not_separable", fmt::format("{} was not told from a drift or a slow branch: the "
-                                              "bands suppose that nothing drifted",
-                                              name)});
+          {"parameter_not_separable",
+           fmt::format(
+               "{} was not told from something else (a drift, a slower branch or a floor of "
+               "the instrument): the bands suppose that there was none",
+               name)});
     }
     for (const std::string& name : law.uncertainty->unconfirmed) {
       p.remarks.push_back(

@@ -18,8 +18,9 @@ namespace tpm::fit {
 namespace {
 
 const ParameterResult* not_separable_in(const FitResult& fit) {
-  const auto found = std::ranges::find_if(
-      fit.parameters, [](const ParameterResult& p) { return p.not_separable.has_value(); });
+  const auto found = std::ranges::find_if(fit.parameters, [](const ParameterResult& p) {
+    return p.not_separable && p.not_separable->code == kDriftOrBranch;
+  });
   return found == fit.parameters.end() ? nullptr : &*found;
 }
 

@@ -14,6 +14,7 @@
 #include "tpm/fit/select/fixed_times.hpp"
 #include "tpm/fit/select/function_starts.hpp"
 #include "tpm/fit/select/gate.hpp"
+#include "tpm/fit/select/instrument_floor.hpp"
 #include "tpm/fit/select/law_choice.hpp"
 #include "tpm/fit/select/reading_scatter.hpp"
 #include "tpm/fit/verdict.hpp"
@@ -140,11 +141,14 @@ Noise noise_of_function(const MaterialFunction& function, const FunctionSizes& s
 
 double largest_residual_share(const FitResult& fit) {
   double sum = 0.0, largest = 0.0;
+  double count = 0.0;
   for (const FittedDatum& d : fit.data) {
+    if (d.datum.held_out) continue;
     sum += std::pow(d.predicted - *d.datum.value, 2);
     largest = std::max(largest, std::abs(*d.datum.value));
+    count += 1.0;
   }
-  return std::sqrt(sum / static_cast<double>(fit.data.size())) / largest;
+  return std::sqrt(sum / count) / largest;
 }
 
 constexpr ProtocolSpans kEndlessHold{.hold_s = std::numeric_limits<double>::infinity()};
@@ -164,14 +168,25 @@ void add_floor(FitConfig& config, std::optional<double> floor) {
   noise.absolute = kShare * *floor;
 }
 
+/// What the first fits tell of the instrument.
+struct InstrumentLimits {
+  std::optional<double> scatter = std::nullopt;           ///< see scatter_floor()
+  double to_s = std::numeric_limits<double>::infinity();  ///< behind it readings stand at a floor
+};
+
+void set_limits(FitConfig& config, const InstrumentLimits& limits) {
+  add_floor(config, limits.scatter);
+  config.data.front().to_s = limits.to_s;
+}
+
 Candidate fit_function(const LawSpec& law, const MaterialFunction& function, SetupOptions setup,
-                       std::optional<double> floor) {
+                       const InstrumentLimits& limits) {
   setup.profiles = false;
   // The stiffness of a spring-pot has no value at the step itself: a reading there is a reason
   // against the law, not an error of the file.
   const bool refusal_counts = law.fractional != Fractional::none;
   FitConfig config = function_config(law, function, setup);
-  add_floor(config, floor);
+  set_limits(config, limits);
   Candidate candidate = fit_candidate(config, data_set_of(function), refusal_counts);
   if (candidate.failed) return candidate;
   candidate.rms_over_peak = largest_residual_share(candidate.fit);
@@ -314,20 +329,20 @@ namespace {
 
 /// Fits every law under one noise and ranks them.
 Selection ranked_laws(const MaterialFunction& function, const SelectionOptions& options,
-                      std::optional<double> floor) {
+                      const InstrumentLimits& limits) {
   const std::vector<LawSpec> laws = options.laws.empty() ? linear_family() : options.laws;
   Selection s;
   s.margin = options.margin;
   Progress progress("fitting laws", laws.size());
   for (const LawSpec& law : laws) {
-    s.candidates.push_back(fit_function(law, function, options.setup, floor));
+    s.candidates.push_back(fit_function(law, function, options.setup, limits));
     progress.advance();
     const Candidate& made = s.candidates.back();
     const bool branched = law.branches > 0 && law.solid && law.form == BranchForm::parallel;
     if (options.only_listed || made.failed || !branched || !plateau_is_not_told(made.fit)) continue;
     LawSpec fluid = law;
     fluid.solid = false;
-    s.candidates.push_back(fit_function(fluid, function, options.setup, floor));
+    s.candidates.push_back(fit_function(fluid, function, options.setup, limits));
   }
   const auto fitted = std::find_if(s.candidates.begin(), s.candidates.end(),
                                    [](const Candidate& c) { return !c.failed; });
@@ -344,20 +359,55 @@ Selection ranked_laws(const MaterialFunction& function, const SelectionOptions& 
 
 }  // namespace
 
+namespace {
+
+std::optional<FloorOfReadings> floor_of(const MaterialFunction& function, const FitResult& fit) {
+  const auto* step = std::get_if<Recording>(&function.data);
+  const bool modulus = step != nullptr && step->response_quantity == Quantity::relaxation_modulus;
+  return modulus ? find_floor(*step, fit) : std::nullopt;
+}
+
+}  // namespace
+
 Selection select_law(const MaterialFunction& function, const SelectionOptions& options) {
-  Selection s = ranked_laws(function, options, std::nullopt);
-  const auto floor = scatter_floor(s.candidates[s.best_bic].fit);
-  if (floor) s = ranked_laws(function, options, floor);
+  InstrumentLimits limits;
+  Selection s = ranked_laws(function, options, limits);
+  const auto standing = floor_of(function, s.candidates[s.best_bic].fit);
+  if (standing) {
+    limits.to_s = standing->last_s;
+    s = ranked_laws(function, options, limits);
+  }
+  limits.scatter = scatter_floor(s.candidates[s.best_bic].fit);
+  const std::optional<double>& floor = limits.scatter;
+  if (floor) s = ranked_laws(function, options, limits);
   const auto with_profiles = [&](const LawSpec& law) {
     FitConfig config = function_config(law, function, options.setup);
-    add_floor(config, floor);
+    set_limits(config, limits);
     return run_fit(config, data_set_of(function));
   };
   settle_choice(s, kEndlessHold, options.setup.profiles ? ProfiledFit(with_profiles) : nullptr);
+  for (const auto i : {std::optional(s.recommended), s.preferred}) {
+    if (!i || !doubt_small_plateau(s.candidates[*i].fit)) continue;
+    LawSpec fluid = s.candidates[*i].law;
+    if (fluid.branches == 0 || fluid.form != BranchForm::parallel) continue;
+    fluid.solid = false;
+    const Candidate without = fit_function(fluid, function, options.setup, limits);
+    if (!without.failed) doubt_what_depends_on_plateau(s.candidates[*i].fit, without.fit);
+  }
   state_preferred(s);
   state_scatter(s);
   const Candidate& chosen = s.candidates[s.recommended];
   s.remarks = range_remarks(chosen.fit, sizes_of_function(function));
+  if (standing) {
+    const Unit unit = shown_unit(quantity_dimension(chosen.fit.data.front().datum.quantity));
+    s.remarks.push_back(
+        {"floor_of_instrument",
+         fmt::format("{} readings are all the least, {}, which rounding does not make: the "
+                     "instrument reads nothing below; {} readings behind {} s, from the first of "
+                     "them on, are left out",
+                     standing->count, with_unit(significant(standing->value / unit.to_si, 4), unit),
+                     standing->behind, significant(standing->last_s, 4))});
+  }
   if (floor) {
     const Unit unit = shown_unit(quantity_dimension(chosen.fit.data.front().datum.quantity));
     const bool alike = *floor > sizes_of_function(function).largest;

@@ -86,32 +86,29 @@ AutomaticBounds contact_bounds(const LawSpec& law, const PreparedRecording& r, c
   return {readable(std::move(fit)), std::nullopt};
 }
 
+/// A zero lies no further away than what was read.
 AutomaticBounds offset_bounds(const LawSpec& law, const PreparedRecording& r, std::string name) {
-  constexpr double kFurther = 10.0;
   const double peak = std::abs(r.phases.peak_response) + std::abs(r.phases.floor_response);
   const Unit unit = shown_unit(quantity_dimension(law.response));
-  AutomaticBounds bounds{readable({std::move(name), unit, Scale::linear, 0.0, -peak, peak}), {}};
-  if (!is_indentation(law)) bounds.widest = WidestBounds{-kFurther * peak, kFurther * peak};
-  return bounds;
+  return {readable({std::move(name), unit, Scale::linear, 0.0, -peak, peak}), std::nullopt};
 }
 
-/// Depth of contact under an imposed force. Every reading under a load lies behind it; a probe that
-/// rested without a load had not passed it. Without such a rest the instrument may have come from
-/// as far as kFurthestContact times the largest depth that it read, and no further.
-AutomaticBounds contact_under_load_bounds(const LawSpec& law, const PreparedRecording& r,
-                                          std::string name) {
-  constexpr double kLoaded = 0.05;  // of the largest force, above the first one
+/// Depth of contact, or strain of the specimen without a load, under an imposed load. Every reading
+/// under a load lies behind it; a probe that rested without a load had not passed it. Otherwise it
+/// may lie as far back as kFurthestContact times the largest reading, and no further.
+AutomaticBounds unloaded_bounds(const LawSpec& law, const PreparedRecording& r, std::string name) {
+  constexpr double kLoaded = 0.05;  // of the largest load, above the first one
   constexpr double kSure = 4.0;     // standard deviations of a reading
-  const std::vector<double>& force = r.recording.drive;
-  const std::vector<double>& depth = r.recording.response;
+  const std::vector<double>& load = r.recording.drive;
+  const std::vector<double>& reading = r.recording.response;
   const std::size_t rest = samples_before_load(r.recording);
-  const double zero = rest > 0 ? force.front() : 0.0;
+  const double zero = rest > 0 ? load.front() : 0.0;
   const double loaded = zero + kLoaded * (r.phases.peak_drive - zero);
   double shallowest = r.phases.peak_response;  // under a load
   double travel = 0.0;
-  for (std::size_t i = rest; i < depth.size(); ++i) {
-    travel = std::max(travel, std::abs(depth[i]));
-    if (force[i] > loaded) shallowest = std::min(shallowest, depth[i]);
+  for (std::size_t i = rest; i < reading.size(); ++i) {
+    travel = std::max(travel, std::abs(reading[i]));
+    if (load[i] > loaded) shallowest = std::min(shallowest, reading[i]);
   }
   const double noise = kSure * r.phases.noise_sd_estimate;
   FitParameter fit;
@@ -121,21 +118,11 @@ AutomaticBounds contact_under_load_bounds(const LawSpec& law, const PreparedReco
   fit.upper = shallowest + noise;
   fit.lower = shallowest - kFurthestContact * travel;
   if (rest > 0) {
-    const auto end = depth.begin() + static_cast<std::ptrdiff_t>(rest);
-    fit.lower = std::min(*std::min_element(depth.begin(), end), shallowest) - noise;
+    const auto end = reading.begin() + static_cast<std::ptrdiff_t>(rest);
+    fit.lower = std::min(*std::min_element(reading.begin(), end), shallowest) - noise;
   }
   fit.start = std::clamp(r.phases.floor_response, fit.lower, fit.upper);
   return {readable(std::move(fit)), std::nullopt};
-}
-
-/// Strain without a load of creep: the load itself is taken as imposed.
-AutomaticBounds strain_zero_bounds(const LawSpec& law, const PreparedRecording& r,
-                                   std::string name) {
-  constexpr double kFurther = 10.0;
-  const double peak = std::abs(r.phases.peak_response) + std::abs(r.phases.floor_response);
-  return {readable({std::move(name), shown_unit(quantity_dimension(law.drive)), Scale::linear,
-                    r.phases.floor_response, -peak, peak}),
-          WidestBounds{-kFurther * peak, kFurther * peak}};
 }
 
 Prior zero_prior(const PreparedRecording& r, const RestReadings& rests) {
@@ -241,9 +228,7 @@ void add_free_placement(FitConfig& config, const LawModel& model, const Prepared
                         const SetupOptions& options) {
   const LawSpec& law = model.spec();
   if (r.load_imposed) {
-    add_automatic(config,
-                  is_indentation(law) ? contact_under_load_bounds(law, r, std::move(offset))
-                                      : strain_zero_bounds(law, r, std::move(offset)),
+    add_automatic(config, unloaded_bounds(law, r, std::move(offset)),
                   {{model.index("contact"), scope}});
     if (options.measured) take_level_before_load(config, r);
     return;

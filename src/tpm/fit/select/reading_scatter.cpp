@@ -131,45 +131,86 @@ void state_scatter(FitResult& fit) {
   if (follow_each_other(scatter)) state_not_described(fit, *scatter, {});
 }
 
-std::optional<double> scatter_floor(const FitResult& fit) {
-  constexpr std::size_t kFewest = 16;
-  constexpr double kSixths = 6.0;      // variance of a second difference, in those of a reading
-  constexpr double kNeighbours = 2.0;  // second differences share readings: half as many count
-  constexpr int kSteps = 81;
-  constexpr double kDecades = 8.0;
-  const NoiseKind kind = fit.config.data.front().noise.kind;
-  if (kind != NoiseKind::relative_to_datum && kind != NoiseKind::absolute) return std::nullopt;
+namespace {
+
+/// Second differences of the residuals along each curve, beside the sizes of their readings.
+struct ScatterOfSizes {
   std::vector<std::pair<double, double>> differences;  // size of a reading, second difference
-  double largest = 0.0;
+  double largest = 0.0;                                ///< reading
+};
+
+/// None below 16 readings of a curve, and for readings without scatter.
+std::optional<ScatterOfSizes> scatter_of_sizes(const FitResult& fit) {
+  constexpr std::size_t kFewest = 16;
+  constexpr double kSixths = 6.0;  // variance of a second difference, in those of a reading
+  ScatterOfSizes scatter;
   for (const auto& curve : reading_curves(fit)) {
     if (curve.size() < kFewest) return std::nullopt;
     for (std::size_t i = 0; i < curve.size(); ++i) {
-      largest = std::max(largest, curve[i].size);
+      scatter.largest = std::max(scatter.largest, curve[i].size);
       if (i == 0 || i + 1 == curve.size()) continue;
       const double off = curve[i - 1].residual - 2.0 * curve[i].residual + curve[i + 1].residual;
       const double size = (curve[i - 1].size + curve[i].size + curve[i + 1].size) / 3.0;
-      differences.emplace_back(size, off / std::sqrt(kSixths));
+      scatter.differences.emplace_back(size, off / std::sqrt(kSixths));
     }
   }
   constexpr double kExact = 1e-6;
   const bool scattered = std::ranges::any_of(
-      differences, [&](const auto& d) { return std::abs(d.second) > kExact * d.first; });
-  if (!scattered) return std::nullopt;
-  double best = 0.0, most = -HUGE_VAL, assumed = 0.0;
+      scatter.differences, [&](const auto& d) { return std::abs(d.second) > kExact * d.first; });
+  return scattered ? std::optional(std::move(scatter)) : std::nullopt;
+}
+
+constexpr double kNeighbours = 2.0;  // second differences share readings: half as many count
+
+/// Floors a / b that are tried, with their likelihoods.
+std::vector<std::pair<double, double>> likelihoods_of_floors(const ScatterOfSizes& scatter) {
+  constexpr int kSteps = 81;
+  constexpr double kDecades = 8.0;
+  std::vector<std::pair<double, double>> tried;
   for (int i = 0; i < kSteps; ++i) {
-    const double floor = largest * std::pow(10.0, -0.75 * kDecades + kDecades * i / (kSteps - 1));
-    const double likelihood = likelihood_of_floor(differences, floor);
-    if (i == 0 || (kind == NoiseKind::absolute && i == kSteps - 1)) assumed = likelihood;
-    if (likelihood > most) {
-      most = likelihood;
-      best = floor;
-    }
+    const double floor =
+        scatter.largest * std::pow(10.0, -0.75 * kDecades + kDecades * i / (kSteps - 1));
+    tried.emplace_back(floor, likelihood_of_floor(scatter.differences, floor));
   }
+  return tried;
+}
+
+}  // namespace
+
+std::optional<double> scatter_floor(const FitResult& fit) {
+  const NoiseKind kind = fit.config.data.front().noise.kind;
+  if (kind != NoiseKind::relative_to_datum && kind != NoiseKind::absolute) return std::nullopt;
+  const auto scatter = scatter_of_sizes(fit);
+  if (!scatter) return std::nullopt;
+  const auto tried = likelihoods_of_floors(*scatter);
+  const auto best = std::ranges::max_element(tried, {}, &std::pair<double, double>::second);
+  const double assumed = (kind == NoiseKind::absolute ? tried.back() : tried.front()).second;
   // On a bound of the parameter the statistic is half a chi-square.
-  if (chi_squared_tail(std::max(most - assumed, 0.0) / kNeighbours, 1.0) >= 2.0 * kLevelOfScatter) {
+  if (chi_squared_tail(std::max(best->second - assumed, 0.0) / kNeighbours, 1.0) >=
+      2.0 * kLevelOfScatter) {
     return std::nullopt;
   }
-  return best;
+  return best->first;
+}
+
+std::optional<double> most_scatter_of_small(const FitResult& fit) {
+  constexpr double kLevel = 0.05;
+  const auto scatter = scatter_of_sizes(fit);
+  if (!scatter) return std::nullopt;
+  const auto tried = likelihoods_of_floors(*scatter);
+  const double best =
+      std::ranges::max_element(tried, {}, &std::pair<double, double>::second)->second;
+  double most = 0.0;
+  for (const auto& [floor, likelihood] : tried) {
+    if (chi_squared_tail((best - likelihood) / kNeighbours, 1.0) < kLevel) continue;
+    double squares = 0.0;
+    for (const auto& [size, off] : scatter->differences) {
+      squares += off * off / ((floor + size) * (floor + size));
+    }
+    const double share = std::sqrt(squares / static_cast<double>(scatter->differences.size()));
+    most = std::max(most, share * floor);
+  }
+  return most;
 }
 
 }  // namespace tpm::fit

@@ -32,4 +32,9 @@ void state_scatter(FitResult& fit);
 /// the file states standard deviations, or below 16 readings of a curve
 [[nodiscard]] std::optional<double> scatter_floor(const FitResult& fit);
 
+/// Largest standard deviation that a reading of 0 may have, of noise a + b |reading|: the end of
+/// the interval (likelihood ratio, 95 %) that the scatter of the residuals allows.
+/// @return none below 16 readings of a curve, and for readings without scatter
+[[nodiscard]] std::optional<double> most_scatter_of_small(const FitResult& fit);
+
 }  // namespace tpm::fit

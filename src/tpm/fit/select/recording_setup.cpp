@@ -15,6 +15,7 @@
 #include "tpm/fit/likelihood/load_imposed.hpp"
 #include "tpm/fit/select/clipping.hpp"
 #include "tpm/fit/select/imposed_channel.hpp"
+#include "tpm/fit/select/kept_load.hpp"
 #include "tpm/fit/select/loading_sense.hpp"
 #include "tpm/fit/select/placement.hpp"
 #include "tpm/fit/select/placement_parameters.hpp"
@@ -136,7 +137,10 @@ void require_rise(const PreparedRecording& r) {
 namespace {
 
 Sizes sizes_of(std::span<const PreparedRecording> recordings) {
-  for (const PreparedRecording& r : recordings) require_rise(r);
+  for (const PreparedRecording& r : recordings) {
+    require_no_kept_load(r);
+    require_rise(r);
+  }
   Sizes sizes;
   sizes.shortest_s = std::numeric_limits<double>::infinity();
   for (const PreparedRecording& r : recordings) {

@@ -126,7 +126,8 @@ std::string later_hold_words(const PreparedRecording& r, const LaterHold& hold,
       "{}: a hold of {} s ({} to {} s) and {} ramp{} after the first unloading (from {} s) are not "
       "fitted: relaxation is seen only through the first ramp; --from-time \"{} s\"{} fits the "
       "ramp that leads to this hold, with contact where the first ramp has it, and without the "
-      "memory of what came before",
+      "memory of what came before: right only if the rest before it lasted several times the "
+      "longest relaxation time",
       r.name, significant(hold.end_s - hold.begin_s, 3), significant(hold.begin_s, kDigits),
       significant(hold.end_s, kDigits), hold.ramps, hold.ramps == 1 ? "" : "s",
       significant(r.to_s, kDigits), significant(hold.rest_s, 4), contact);

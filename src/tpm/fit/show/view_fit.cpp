@@ -145,7 +145,7 @@ void add_law(ViewPage& page, const std::filesystem::path& file) {
     }
     for (const std::string& parameter : u->at_bound) page.fact("fixed on a bound", parameter);
     for (const std::string& parameter : u->not_separable) {
-      page.fact("not separable from a drift", parameter);
+      page.fact("not separable", parameter);
     }
     for (const std::string& parameter : u->unconfirmed) {
       page.fact("not identified: minimum not trusted", parameter);
