@@ -137,7 +137,10 @@ std::string range_words(const ParameterResult& p, double level) {
         return fmt::format(
             "{} = {} is not identified: {}: not separable; {} interval without {} {}", f.name,
             in_sized_unit(p, p.estimate), p.not_separable, percent(level),
-            p.not_separable.starts_with("drift") ? "drift" : "such a branch", interval);
+            p.not_separable.starts_with("drift")     ? "drift"
+            : p.not_separable.starts_with("contact") ? "such a loading"
+                                                     : "such a branch",
+            interval);
       }
       if (p.unconfirmed) {
         return fmt::format("{} = {} is not identified: {}; {} interval of this minimum {}", f.name,
