@@ -1,5 +1,5 @@
-// Errors of the drive that the law answers as if they were motion: steps of its record, noise; and
-// a contact that lies where readings show no force.
+// Noise of the drive, which the law answers as if it were motion; and a contact that a kernel which
+// only happens to fit leads back to.
 #include <algorithm>
 #include <catch2/catch.hpp>
 #include <cmath>
