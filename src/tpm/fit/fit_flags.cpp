@@ -69,7 +69,9 @@ void flag_noise(FitResult& result) {
              kComputedShare)});
   }
   if (result.noise) {
-    result.remarks.push_back({result.noise->limited ? "limited_by_resolution" : "correlated_noise",
+    result.remarks.push_back({result.noise->limited      ? "limited_by_resolution"
+                              : result.noise->correlated ? "correlated_noise"
+                                                         : "drive_noise",
                               result.noise->summary});
   } else if (result.inflation > 1.0) {
     result.remarks.push_back(

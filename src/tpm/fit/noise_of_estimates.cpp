@@ -203,6 +203,10 @@ class Estimates {
     const Eigen::Index values = rows_.values();
     return (bread_ * scaled_.topRows(values).transpose()).cwiseAbs() * off;
   }
+  /// Change of the estimates with a slope of half the sum of squares, by the natural parameters.
+  [[nodiscard]] Eigen::VectorXd moved_by(const Eigen::VectorXd& slope) const {
+    return bread_ * slope.cwiseQuotient(length_);
+  }
   [[nodiscard]] const Eigen::VectorXd& length() const { return length_; }
 
  private:
@@ -260,7 +264,32 @@ Eigen::VectorXd limiting_steps(const NoiseRows& rows, double variance, double de
       .matrix();
 }
 
-std::string words_of(const NoiseOfEstimates& noise, Eigen::Index samples) {
+/// Bias from noise of the drive, of scaled parameters (drive_noise_slope): the mean of what the
+/// slope says here and where the estimates would be without it, where it is steeper (a dashpot
+/// answers noise the more the faster it is). Zero where it matters little.
+Eigen::VectorXd bias_of_drive_noise(const ExperimentResiduals& function, const Estimates& estimates,
+                                    std::span<const FitParameter> parameters,
+                                    const std::vector<std::size_t>& free,
+                                    std::span<const double> natural, double variance) {
+  constexpr double kMatters = 0.25;  // standard errors
+  const std::vector<Eigen::Index> columns(free.begin(), free.end());
+  const auto here = function.drive_noise_slope(natural);
+  const Eigen::VectorXd none = Eigen::VectorXd::Zero(estimates.length().size());
+  if (!here) return none;
+  const Eigen::VectorXd moved = estimates.moved_by((*here)(columns));
+  const Eigen::ArrayXd error = (variance * estimates.plain_variance()).array().sqrt();
+  if (!(moved.array().abs() > kMatters * error).any()) return none;
+  const Eigen::VectorXd by = moved.cwiseQuotient(estimates.length());
+  std::vector<double> without(natural.begin(), natural.end());
+  for (Eigen::Index k = 0; k < by.size(); ++k) {
+    const std::size_t i = free[static_cast<std::size_t>(k)];
+    without[i] = std::clamp(natural[i] + by[k], parameters[i].lower, parameters[i].upper);
+  }
+  const auto there = function.drive_noise_slope(without);
+  return 0.5 * (moved + (there ? estimates.moved_by((*there)(columns)) : moved)).cwiseAbs();
+}
+
+std::string words_of(const NoiseOfEstimates& noise, bool by_drive, Eigen::Index samples) {
   std::string words;
   if (noise.correlated) {
     words = fmt::format(
@@ -272,6 +301,11 @@ std::string words_of(const NoiseOfEstimates& noise, Eigen::Index samples) {
       words += fmt::format("; beyond this, variances are {} times as large",
                            significant(noise.beyond, 3));
     }
+  }
+  if (by_drive) {
+    words += fmt::format(
+        "{}the noise of the drive, which the law answers, biases estimates; intervals allow for it",
+        words.empty() ? "" : "; ");
   }
   if (noise.limited) {
     words += fmt::format(
@@ -337,7 +371,10 @@ std::optional<NoiseOfEstimates> noise_of_estimates(const ExperimentResiduals& fu
       limiting_steps(*rows, seen_size, freedom * (1.0 - square) / (1.0 + square));
   noise.variance = scale_known ? 1.0 : seen_size;
   const bool limited = off.size() > 0 && off.maxCoeff() > 0.0;
-  if (!noise.correlated && !limited) return std::nullopt;
+  const Eigen::VectorXd bias_of_drive =
+      bias_of_drive_noise(function, estimates, parameters, noise.free, natural, seen_size);
+  const bool by_drive = bias_of_drive.maxCoeff() > 0.0;
+  if (!noise.correlated && !limited && !by_drive) return std::nullopt;
 
   if (noise.correlated) {
     Eigen::VectorXd white = rows->residual;
@@ -362,7 +399,7 @@ std::optional<NoiseOfEstimates> noise_of_estimates(const ExperimentResiduals& fu
           (estimates.by_readings(above) - estimates.by_readings(below)).diagonal() +
       (scale_known ? 0.0 : found.log_squares_slope) * readings.diagonal();
   const Eigen::VectorXd plain = estimates.plain_variance();
-  const Eigen::VectorXd bias = estimates.largest_bias(off);
+  const Eigen::VectorXd bias = estimates.largest_bias(off) + bias_of_drive;
   noise.of.assign(parameters.size(), {});
   for (Eigen::Index k = 0; k < p; ++k) {
     const double by_phi = noise.correlated ? slope[k] / all(k, k) : 0.0;
@@ -377,7 +414,7 @@ std::optional<NoiseOfEstimates> noise_of_estimates(const ExperimentResiduals& fu
         all(k, k) / plain[k], std::max(degrees, 1.0), bias[k] / std::sqrt(plain[k])};
   }
   noise.limited = limited;
-  noise.summary = words_of(noise, rows->values());
+  noise.summary = words_of(noise, by_drive, rows->values());
   return noise;
 }
 

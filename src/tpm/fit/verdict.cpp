@@ -139,7 +139,8 @@ std::string range_words(const ParameterResult& p, double level) {
             in_sized_unit(p, p.estimate), p.not_separable->text, percent(level),
             p.not_separable->code == kDriftOrBranch     ? "drift"
             : p.not_separable->code == kPlateauOrBranch ? "such a branch"
-                                                        : "such a floor",
+            : p.not_separable->code == kPlateauOrFloor  ? "such a floor"
+                                                        : "such a loading",
             interval);
       }
       if (p.unconfirmed) {

@@ -31,10 +31,12 @@ namespace tpm::fit {
 /// One sentence for a reader, made from the numbers.
 [[nodiscard]] std::string parameter_words(const ParameterResult& parameter, double level);
 
-/// Code of ParameterResult::not_separable where no rest tells a drift of the zero.
+/// Codes of ParameterResult::not_separable: no rest tells a drift of the zero; a material function
+/// does not tell its plateau; contact trades off with a loading that no probe's exponent describes.
 inline constexpr const char* kDriftOrBranch = "drift_or_slow_branch";
 inline constexpr const char* kPlateauOrBranch = "plateau_or_slower_branch";
 inline constexpr const char* kPlateauOrFloor = "plateau_or_floor";
+inline constexpr const char* kContactOrLoading = "contact_or_loading";
 
 /// "eta1 = 5 Pa s is excluded by these data (...)" or "undetermined ...".
 [[nodiscard]] std::string hypothesis_words(const HypothesisResult& result, double level);

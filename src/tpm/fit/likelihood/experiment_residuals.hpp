@@ -1,4 +1,5 @@
 #pragma once
+#include <cstdint>
 #include <memory>
 #include <optional>
 #include <string>
@@ -62,6 +63,12 @@ class ExperimentResiduals final : public ResidualFunction {
 
   /// The same experiments, with data that can be replaced apart from these.
   [[nodiscard]] std::unique_ptr<ExperimentResiduals> copy() const;
+  /// Noise e of measured drives adds f(e) to the residuals, which the law answers as if e were
+  /// motion: d/dtheta E|f(e)|^2 / 2 by the estimated parameters, natural. Estimated with as much
+  /// white noise again as the drives show at rest, before the fitted samples; none if they show
+  /// none.
+  [[nodiscard]] std::optional<Eigen::VectorXd> drive_noise_slope(
+      std::span<const double> natural) const;
   /// A copy with at most about `most` samples of each recording, evenly taken from the history and
   /// from the response: for the search of starts only.
   [[nodiscard]] std::unique_ptr<ExperimentResiduals> thinned(std::size_t most) const;
@@ -92,6 +99,8 @@ class ExperimentResiduals final : public ResidualFunction {
   };
 
   ExperimentResiduals() = default;
+  /// A copy with that noise; null if there is none.
+  [[nodiscard]] std::unique_ptr<ExperimentResiduals> with_noisier_drives(std::uint64_t seed) const;
   /// Factor of a datum's residuals.
   [[nodiscard]] double weight(std::size_t datum) const;
   /// The model's answer to an experiment, one value per reading.

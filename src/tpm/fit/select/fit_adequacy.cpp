@@ -14,6 +14,7 @@
 #include "tpm/fit/adequacy.hpp"
 #include "tpm/fit/likelihood/load_imposed.hpp"
 #include "tpm/fit/select/configuration_remarks.hpp"
+#include "tpm/fit/select/doubtful_contact.hpp"
 #include "tpm/fit/select/law_choice.hpp"
 #include "tpm/fit/select/reading_scatter.hpp"
 #include "tpm/fit/select/unloading_test.hpp"
@@ -436,6 +437,7 @@ std::size_t samples_at_rest(const RecordingPhases& phases) {
 
 void state_adequacy(FitResult& fit, std::span<const PreparedRecording> recordings,
                     std::size_t fits) {
+  doubt_contact(fit);
   const std::vector<RestedRecording> rests = rested(recordings);
   const auto worst = worst_of(fit, rests, fits);
   if (worst) state(fit, stated(fit, *worst, 1, {}));
@@ -452,6 +454,9 @@ void state_preferred(Selection& s) {
 }
 
 void state_adequacy(Selection& s, std::span<const PreparedRecording> recordings) {
+  for (const auto i : {std::optional(s.recommended), s.preferred}) {
+    if (i) doubt_contact(s.candidates[*i].fit);
+  }
   state_of_rests(s, recordings);
   state_preferred(s);
   state_hysteresis(s);
@@ -459,6 +464,7 @@ void state_adequacy(Selection& s, std::span<const PreparedRecording> recordings)
 }
 
 void state_adequacy(FitResult& fit, const std::vector<DataSet>& data) {
+  doubt_contact(fit);
   std::optional<Judged> judged = against_stated_noise(fit);
   if (!judged && !fit.recordings.empty()) {
     std::vector<RestedRecording> rests(data.size());

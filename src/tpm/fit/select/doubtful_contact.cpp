@@ -1,0 +1,42 @@
+#include "tpm/fit/select/doubtful_contact.hpp"
+
+#include <algorithm>
+#include <array>
+
+#include "tpm/fit/conditional.hpp"
+#include "tpm/fit/verdict.hpp"
+
+namespace tpm::fit {
+namespace {
+
+/// True if the exponent was fitted, and its interval holds that of no probe.
+bool has_exponent_of_no_probe(const FitResult& fit) {
+  constexpr std::array kOfProbes{1.0, 1.5, 2.0};
+  const auto exponent = std::ranges::find_if(
+      fit.parameters, [](const ParameterResult& p) { return p.parameter.name == "exponent"; });
+  if (exponent == fit.parameters.end()) return false;
+  return std::ranges::none_of(kOfProbes, [&](double m) {
+    return (!exponent->lower || *exponent->lower <= m) &&
+           (!exponent->upper || m <= *exponent->upper);
+  });
+}
+
+}  // namespace
+
+void doubt_contact(FitResult& fit) {
+  constexpr double kMuchLess = 3.0;  // times the standard error
+  if (!fit.config.law || fit.config.law->kernel != Kernel::power) return;
+  if (!has_exponent_of_no_probe(fit)) return;
+  for (std::size_t i = 0; i < fit.parameters.size() && i < fit.config.parameters.size(); ++i) {
+    ParameterResult& p = fit.parameters[i];
+    const auto& prior = fit.config.parameters[i].prior;
+    const bool contact = p.nuisance && is_contact(fit.config, i);
+    if (!contact || p.verdict != Verdict::identified || p.not_separable) continue;
+    if (!prior || !p.standard_error || prior->sd < kMuchLess * *p.standard_error) continue;
+    p.not_separable =
+        Remark{kContactOrLoading, "contact or a loading that is no power of the depth"};
+    p.summary = parameter_words(p, fit.config.level);
+  }
+}
+
+}  // namespace tpm::fit

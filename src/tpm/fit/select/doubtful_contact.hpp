@@ -1,0 +1,13 @@
+#pragma once
+#include "tpm/fit/fit.hpp"
+
+namespace tpm::fit {
+
+/// A kernel whose fitted exponent is that of no probe (1 of a punch, 1.5 of a ball, 2 of a cone) is
+/// a power that happens to follow the loading, of a thin layer or a tissue that stiffens, say. It
+/// leads back to a contact of its own, which may lie far in the air. Where what was measured of the
+/// contact is much less sure than the fit, contact is not called identified
+/// (ParameterResult::not_separable).
+void doubt_contact(FitResult& fit);
+
+}  // namespace tpm::fit

@@ -1,0 +1,116 @@
+// Noise of the drive, which the law answers as if it were motion; and a contact that a kernel which
+// only happens to fit leads back to.
+#include <algorithm>
+#include <catch2/catch.hpp>
+#include <cmath>
+
+#include "placed_recordings.hpp"
+#include "tpm/fit/select/selection.hpp"
+#include "tpm/fit/verdict.hpp"
+#include "tpmkit/law_model.hpp"
+
+using namespace tpm;
+using namespace tpm::base;
+using namespace tpm::data;
+using namespace tpm::fit;
+using Catch::Contains;
+using Catch::StartsWith;
+
+namespace {
+
+Selection selected_of(const PreparedRecording& recording, const std::string& law, bool profiles) {
+  SelectionOptions options;
+  options.laws = {parse_law_name(law, "test")};
+  options.only_listed = true;
+  options.held_out = false;
+  options.setup.starts = 4;
+  options.setup.profiles = profiles;
+  return select_law(std::span(&recording, 1), options);
+}
+
+const ParameterResult& parameter_of(const FitResult& fit, const std::string& name) {
+  return *std::ranges::find_if(fit.parameters,
+                               [&](const ParameterResult& p) { return p.parameter.name == name; });
+}
+
+}  // namespace
+
+TEST_CASE("noise of the drive does not move the plateau out of its interval", "[imposed_noise]") {
+  constexpr int kRecordings = 10;
+  int missing = 0;
+  for (std::uint64_t seed = 1; seed <= kRecordings; ++seed) {
+    // Kelvin-Voigt, 400 N/m and 6 N s/m, moved by a hand and read at 1 kHz.
+    Random random(seed);
+    Recording r;
+    r.header.id = "made";
+    const double turn = 2.0 * std::acos(-1.0);
+    std::vector<double> depth_m;
+    for (int i = 0; i < 1800; ++i) {
+      const double t = 1e-3 * i;
+      const double grown = std::max(t - 0.5, 0.0) / 7.5;
+      r.time_s.push_back(t);
+      depth_m.push_back(4e-3 * grown *
+                        (1.5 + std::sin(0.8 * turn * t) + 0.4 * std::sin(2.3 * turn * t + 1.0)));
+    }
+    for (std::size_t i = 0; i < depth_m.size(); ++i) {
+      const std::size_t a = i > 0 ? i - 1 : 0, b = std::min(i + 1, depth_m.size() - 1);
+      const double speed = (depth_m[b] - depth_m[a]) / (r.time_s[b] - r.time_s[a]);
+      r.drive.push_back(depth_m[i] + 1e-6 * random.normal());
+      r.response.push_back(400.0 * depth_m[i] + 6.0 * speed + 0.01 * random.normal());
+    }
+    const PreparedRecording recording = prepare_recording("made.csv", std::move(r));
+    const Selection s = selected_of(recording, "linear-1", true);
+    const ParameterResult& p = parameter_of(s.candidates[s.recommended].fit, "k_inf");
+    missing += p.lower && p.upper && (*p.lower > 400.0 || *p.upper < 400.0);
+  }
+  CHECK(missing <= 2);
+}
+
+TEST_CASE("a contact that only a power with an exponent of no probe tells is not identified",
+          "[doubtful_contact]") {
+  // A ball of 3 mm on a layer of 2 mm stiffens more than a power does (Dimitriadis 2002).
+  const auto recording_of = [](bool layer) {
+    test::PlacedTest placed;
+    placed.law = "power-1";
+    placed.material = {40.0, 20.0, 5.0, 1.5};
+    placed.reference_m = 1e-3;
+    placed.depth_m = 1e-3;
+    placed.ramp_s = 1.0;
+    placed.rest_s = 3.0;
+    Recording clean = test::placed(placed);
+    if (layer) {
+      // The force is linear in the kernel: along u^1.5 (1 + ...) instead of u^1.5.
+      std::vector<double> bent;
+      for (const double depth : clean.drive) {
+        const double chi = std::sqrt(3e-3 * std::max(depth, 0.0)) / 2e-3;
+        const double more = 1.0 + 1.133 * chi + 1.283 * chi * chi + 0.769 * std::pow(chi, 3);
+        bent.push_back(depth * std::pow(more, 1.0 / 1.5));
+      }
+      LawSpec spec = test::spec_of(placed);
+      std::vector<double> values = placed.material;
+      values.resize(law_parameters(spec).size(), 0.0);
+      Protocol history = measured_history(Drive::displacement, clean.time_s, bent);
+      history.set_equilibrium_at_start(true);
+      const Eigen::VectorXd force =
+          LawModel(spec).respond(history, clean.time_s, values, Want::values).value;
+      clean.response.assign(force.begin(), force.end());
+    }
+    placed.noise_N = 1e-4;
+    Random random(3);
+    return prepare_recording("made.csv", test::measured(placed, std::move(clean), random));
+  };
+  const Selection bent = selected_of(recording_of(true), "power-1", true);
+  const FitResult& layer = bent.candidates[bent.recommended].fit;
+  CHECK(parameter_of(layer, "exponent").lower.value() > 2.0);
+  const ParameterResult& far = parameter_of(layer, "contact");
+  REQUIRE(far.upper);
+  CHECK(*far.upper < -4e-5);  // it was at 0
+  CHECK_THAT(verdict_text(far), StartsWith("not identified: contact or a loading"));
+  CHECK_THAT(far.summary, Contains("interval without such a loading"));
+  const Selection straight = selected_of(recording_of(false), "power-1", true);
+  const ParameterResult& near =
+      parameter_of(straight.candidates[straight.recommended].fit, "contact");
+  CHECK_FALSE(near.not_separable);
+  CHECK(near.lower.value() < 0.0);
+  CHECK(near.upper.value() > 0.0);
+}
