@@ -94,6 +94,18 @@ TEST_CASE("titles of machines are read where their meaning is beyond doubt") {
              Contains("column 1 'Time', s") && Contains("column 2 'Depth', in"));
 }
 
+TEST_CASE("a title and a row of units that disagree are refused with what to type") {
+  CHECK_THAT(refusal_of_titles("Time [s],Depth [mm],Force [N]\ns,mm,mN"),
+             Contains("unit N in its title, and mN in the row of units") &&
+                 Contains("--unit \"Force=N\" or --unit \"Force=mN\""));
+  CHECK(refusal_of_titles("Time [s],Depth [mm],Force [mN]\ns,mm,mN").empty());
+  CHECK(refusal_of_titles("Time,Depth,Force\ns,mm,mN").empty());
+  ImportOptions options;
+  set_reading_unit(options, "Force", "mN", "test");
+  const auto read = read_titled("Time [s],Depth [mm],Force [N]\ns,mm,mN", options);
+  CHECK(read.recording.response.back() == 60e-3);
+}
+
 TEST_CASE("a unit that may be two is refused with what to type") {
   for (const char* unit : {"MN", "Mn", "mn"}) {
     INFO(unit);

@@ -110,6 +110,8 @@ inline std::vector<ErrorCase> machine_cases() {
       {type, "wrong column", import, machine("a,b,c\n0,0,0\n1,1,1\n")},
       {type, "no unit", import, machine("Time,Force,Depth\n0,0,0\n1,1,1\n")},
       {type, "wrong unit", import, machine("Time,Force,Depth\ns,mm,mm\n0,0,0\n1,1,1\n")},
+      {type, "two units of a column", import,
+       machine("Time (s),Force (N),Depth (mm)\ns,mN,mm\n0,0,0\n1,1,1\n")},
       {type, "unit of no column", import + " --unit Last=mN", machine(head + "0,0,0\n1,1,1\n")},
       {type, "no number", import, machine(head + "0,0,0\n1,high,1\n")},
       {type, "NaN", import, machine(head + "0,0,0\n1,nan,1\n")},

@@ -184,7 +184,8 @@ std::optional<SpectrumFault> find_spectrum_fault(const std::vector<double>& freq
     }
     if (!seen.insert(frequency[i]).second) {
       return SpectrumFault{i, fmt::format("frequency {} stands twice", frequency[i]),
-                           "each frequency once"};
+                           "each frequency once: one sweep, of one temperature and one amplitude, "
+                           "a file"};
     }
     for (const auto& [name, value] :
          {std::pair{"storage", storage[i]}, std::pair{"loss", loss[i]}}) {

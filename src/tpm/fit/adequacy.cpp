@@ -184,6 +184,22 @@ double p_of(std::span<const double> residual, int parameters, const RestNoise& n
   return fisher_tail(square / noise.variance, degrees, noise.degrees);
 }
 
+/// True if what should rest scatters by so much more than what a law leaves that it is no noise.
+bool is_restless(const AdequacyData& data) {
+  constexpr double kRestless = 2.0;  // times the residual
+  const auto lag1 = lag1_about(data.residual, 0.0);
+  if (!lag1) return false;
+  const double r = upper_correlation(*lag1, data.residual.size(), false);
+  const auto degrees = [r](double n) { return std::max(n * (1.0 - r * r) / (1.0 + r * r), 1.0); };
+  const double of_rest = static_cast<double>(data.rest.size()) - 2.0;
+  const double of_residual = static_cast<double>(data.residual.size()) - data.parameters;
+  const RestLine line = line_through(data.rest_time_s, data.rest);
+  const double ratio =
+      (squares_about(line.off, 0.0) / of_rest) / (squares_about(data.residual, 0.0) / of_residual);
+  return ratio > kRestless * kRestless &&
+         fisher_tail(ratio, degrees(of_rest), degrees(of_residual)) < kSure;
+}
+
 std::size_t longest_equal(std::span<const double> values, std::size_t first, std::size_t last,
                           double but) {
   std::size_t longest = 0;
@@ -299,8 +315,13 @@ std::vector<Remark> causes_of(const AdequacyData& data, const RestNoise& noise, 
   const std::size_t early = std::max<std::size_t>(data.residual.size() / 10, 5);
   if (causes.empty() && data.residual.size() > 3 * early &&
       p_of(data.residual.subspan(early), data.parameters, noise) >= level) {
-    causes.push_back(
-        {"transient", fmt::format("transient: without the first {} samples, to {} s, it would",
+    // Without its ramp any kernel describes a hold.
+    constexpr std::ptrdiff_t kShape = 10;  // samples that show the shape of a ramp
+    const auto ramp = std::ranges::upper_bound(data.time_s, data.ramp_to_s) - data.time_s.begin();
+    const bool has_ramp = ramp >= kShape && ramp <= static_cast<std::ptrdiff_t>(early);
+    causes.push_back({has_ramp ? "ramp_or_transient" : "transient",
+                      fmt::format("{}: without the first {} samples, to {} s, it would",
+                                  has_ramp ? "the shape of the ramp, or a transient" : "transient",
                                   early, significant(data.time_s[early], 4))});
   }
   return causes;
@@ -384,6 +405,8 @@ Adequacy judge_adequacy(const AdequacyData& data, double level) {
   Adequacy result;
   const auto n = static_cast<double>(data.residual.size());
   if (data.rest.size() < kFewestAtRest || !(n > data.parameters)) return result;
+  result.restless = is_restless(data);
+  if (result.restless) return result;
   const RestNoise noise = noise_of(data);
   result.noise_sd = std::sqrt(noise.variance);
   result.noise_under_load = noise.under_load;

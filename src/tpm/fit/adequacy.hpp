@@ -15,7 +15,7 @@ namespace tpm::fit {
 enum class Described {
   adequate,       ///< the residuals are no larger than the noise
   not_described,  ///< they are, at the level of the test
-  not_judged,     ///< the rest is too short to tell the noise
+  not_judged,     ///< the rest is too short to tell the noise, or no rest
 };
 
 /// "adequate", "not_described", "not_judged": as files say it.
@@ -34,6 +34,7 @@ struct AdequacyData {
   int parameters = 0;                   ///< fitted, 0 or more
   /// Variance that the noise of the imposed channel adds to the residual and not to the rest.
   double carried_variance = 0.0;
+  double ramp_to_s = 0.0;  ///< where the drive first reaches its largest value, among the fitted
 };
 
 /// Straight trend of the readings at rest.
@@ -57,6 +58,7 @@ struct Adequacy {
   bool noise_under_load = false;  ///< neighbouring readings under load scatter by more than at rest
   double rest_degrees = 0.0;      ///< degrees of freedom of its square
   double p_value = 1.0;           ///< of a ratio at least this large if the law is right
+  bool restless = false;          ///< not judged, because what should rest scatters too much
   std::vector<Remark> causes;     ///< likely ones, if not described
 };
 
@@ -98,6 +100,10 @@ struct RestBend {
 /// residuals scatter about their neighbours by more than the rest, s^2 is that scatter instead: of
 /// blocks of 32 samples the median of second differences, which a course that is smooth or jumps
 /// now and then leaves out.
+///
+/// Where readings at rest scatter by more than twice the residuals, and by more than chance, they
+/// are no noise (a force cell that settles, a probe that swings in the air): any law would lie
+/// within them, and nothing is judged.
 ///
 /// @param level probability of calling a law that is right not described, in (0, 1)
 /// Throws Error(bad_input) for readings that are not finite or spans of unequal lengths.

@@ -42,11 +42,19 @@ Unit unit_of(const MachineColumn& column, Dimension dimension, const std::string
   const std::string name =
       column.name.empty() ? std::to_string(column.index + 1) : printable(column.name);
   if (!column.unit_readings.empty()) {
-    throw bad_input(where,
-                    fmt::format("unit '{}' may be {}", printable(column.unit),
-                                fmt::join(column.unit_readings, " or ")),
-                    fmt::format("--unit \"{0}={1}\" or --unit \"{0}={2}\"", name,
-                                column.unit_readings.front(), column.unit_readings.back()));
+    const std::string either = fmt::format("{}", fmt::join(column.unit_readings, " or "));
+    const auto same_letter = [](unsigned char a, unsigned char b) {
+      return std::tolower(a) == std::tolower(b);
+    };
+    const bool two_rows =
+        !std::ranges::equal(column.unit_readings.front(), column.unit_readings.back(), same_letter);
+    throw bad_input(
+        where,
+        two_rows ? fmt::format("unit {} in its title, and {} in the row of units",
+                               printable(column.unit_readings.front()), printable(column.unit))
+                 : fmt::format("unit '{}' may be {}", printable(column.unit), either),
+        fmt::format("--unit \"{0}={1}\" or --unit \"{0}={2}\"", name, column.unit_readings.front(),
+                    column.unit_readings.back()));
   }
   const bool known = is_unit(column.unit);
   const bool fits = known && parse_unit(column.unit, where).dimension == dimension;

@@ -240,6 +240,14 @@ std::vector<HeaderRow> rows_above(const DelimitedTable& table, const SampleBlock
   return rows;
 }
 
+/// True for two units of one dimension and unlike sizes: a title and the row below it say each its
+/// own, and nothing tells which was written by whoever chose the numbers.
+bool disagree(const std::string& of_title, const std::string& of_row) {
+  if (of_title == of_row || !is_unit(of_title) || !is_unit(of_row)) return false;
+  const Unit one = parse_unit(of_title, {}), other = parse_unit(of_row, {});
+  return one.dimension == other.dimension && one.to_si != other.to_si;
+}
+
 MachineColumn described_column(std::size_t index, const HeaderRows& rows,
                                const ImportOptions& options) {
   const ColumnTitle title = split_title(cell_or_empty(rows.titles, index));
@@ -256,6 +264,9 @@ MachineColumn described_column(std::size_t index, const HeaderRows& rows,
     column.unit_is_chosen |= column.is_named(selector);
   }
   column.unit = written_unit(chosen);
+  if (!column.unit_is_chosen && disagree(title.unit, unit)) {
+    column.unit_readings = {title.unit, unit};
+  }
   const bool per_second = is_unit(column.unit) && parse_unit(column.unit, {}).symbol == "Hz" &&
                           column.unit.find("Hz") == std::string::npos;
   if (per_second && is_angular(column.name)) column.unit = "rad/s";

@@ -206,6 +206,31 @@ bool prefers_a_dashpot(const Selection& s) {
       });
 }
 
+/// True if the probe comes through the air and the load falls below its rest as it withdraws: it
+/// sticks to the specimen, which bends the loading near contact, too.
+bool sticks(const PreparedRecording& r) {
+  constexpr double kAir = 0.01, kPulls = 0.01;  // of the travel, and of the load
+  constexpr double kSure = 8.0;                 // standard deviations of the noise
+  constexpr int kInARow = 3;
+  const RecordingPhases& found = r.phases;
+  const Recording& read = r.recording;
+  const double travel = found.peak_drive - found.contact_drive;
+  if (read.drive_quantity != Quantity::indentation_depth || !found.contact_found ||
+      found.preloaded || found.contact_drive - read.drive.front() < kAir * travel) {
+    return false;
+  }
+  const double least =
+      found.floor_response - std::max(kSure * found.noise_sd_estimate,
+                                      kPulls * (found.peak_response - found.floor_response));
+  const auto peak = std::ranges::max_element(read.drive) - read.drive.begin();
+  int count = 0;
+  for (std::size_t i = static_cast<std::size_t>(peak); i < read.response.size(); ++i) {
+    count = read.response[i] < least ? count + 1 : 0;
+    if (count == kInARow) return true;
+  }
+  return false;
+}
+
 /// True if a law that was fitted describes the recording, by its rests.
 bool one_describes(const Selection& s, std::span<const PreparedRecording> recordings) {
   return std::ranges::any_of(s.candidates, [&](const Candidate& c) {
@@ -245,6 +270,15 @@ void name_channel_cause(Selection& s, std::span<const PreparedRecording> recordi
     return;
   }
   if (one_describes(s, recordings) && !prefers_a_dashpot(s)) return;
+  if (sticks(r)) {
+    const std::string cause = fmt::format(
+        "adhesion: the {} falls below its rest as the probe withdraws: it sticks, which these laws "
+        "do not have",
+        load_word(r.recording));
+    fit.adequacy->causes.push_back({"adhesion", cause});
+    fit.adequacy->summary += fmt::format("; likely cause: {}", cause);
+    return;
+  }
   SetupOptions quick = setup;
   quick.profiles = false;
   quick.placements = nullptr;

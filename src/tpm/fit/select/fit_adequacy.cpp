@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 #include <iterator>
+#include <span>
 #include <utility>
 
 #include "tpm/base/distributions.hpp"
@@ -13,11 +14,14 @@
 #include "tpm/base/text.hpp"
 #include "tpm/fit/adequacy.hpp"
 #include "tpm/fit/likelihood/load_imposed.hpp"
+#include "tpm/fit/select/carried_noise.hpp"
 #include "tpm/fit/select/configuration_remarks.hpp"
 #include "tpm/fit/select/doubtful_contact.hpp"
 #include "tpm/fit/select/law_choice.hpp"
+#include "tpm/fit/select/motion_before_load.hpp"
 #include "tpm/fit/select/reading_scatter.hpp"
 #include "tpm/fit/select/unloading_test.hpp"
+#include "tpm/fit/spikes_at_rest.hpp"
 #include "tpm/fit/verdict.hpp"
 
 namespace tpm::fit {
@@ -48,52 +52,33 @@ struct RestedRecording {
   std::size_t at_rest = 0;
 };
 
-/// A value less the line between its neighbours: what noise and corners leave of a course.
-std::vector<double> off_neighbours(std::span<const double> time_s, std::span<const double> values) {
-  std::vector<double> off;
-  for (std::size_t i = 1; i + 1 < values.size(); ++i) {
-    const double share = (time_s[i] - time_s[i - 1]) / (time_s[i + 1] - time_s[i - 1]);
-    off.push_back(values[i] - values[i - 1] - share * (values[i + 1] - values[i - 1]));
+/// Where the drive first comes near its largest value, among the fitted samples.
+double ramp_end_s(const RecordingFit& fit) {
+  constexpr double kNear = 0.99;  // of the travel
+  double low = HUGE_VAL, high = -HUGE_VAL;
+  for (std::size_t i = 0; i < fit.time_s.size(); ++i) {
+    if (!fit.fitted[i]) continue;
+    low = std::min(low, fit.drive[i]);
+    high = std::max(high, fit.drive[i]);
   }
-  return off;
-}
-
-/// Variance that noise of the imposed channel, measured where it rests, adds to the residual: the
-/// law answers the measured channel, noise and all. A change within one sample meets the stiffness
-/// (or compliance) of the law there, which is how its answer bends where the channel does.
-double carried_variance(const RecordingFit& fit, const Recording& r, std::size_t at_rest) {
-  constexpr std::size_t kFewest = 10;
-  if (at_rest < kFewest) return 0.0;
-  std::vector<double> time, imposed, answer;
-  for (std::size_t i = 0; i < fit.time_s.size() && i < r.drive.size(); ++i) {
-    if (!fit.fitted[i] || !std::isfinite(fit.predicted[i])) continue;
-    time.push_back(fit.time_s[i]);
-    imposed.push_back(r.drive[i]);
-    answer.push_back(fit.predicted[i]);
+  for (std::size_t i = 0; i < fit.time_s.size(); ++i) {
+    if (fit.fitted[i] && fit.drive[i] - low >= kNear * (high - low)) return fit.time_s[i];
   }
-  const std::vector<double> bends = off_neighbours(time, imposed);
-  const std::vector<double> answers = off_neighbours(time, answer);
-  double squares = 0.0, products = 0.0;
-  for (std::size_t i = 0; i < bends.size(); ++i) {
-    squares += bends[i] * bends[i];
-    products += bends[i] * answers[i];
-  }
-  double rest_squares = 0.0;
-  const auto rest_time = std::span(r.time_s).first(at_rest);
-  const std::vector<double> rest = off_neighbours(rest_time, std::span(r.drive).first(at_rest));
-  for (const double off : rest) rest_squares += off * off;
-  if (!(squares > 0.0)) return 0.0;
-  constexpr double kOfLine = 1.5;  // a value less the mean of two others has 1.5 times its variance
-  const double stiffness = products / squares;
-  return stiffness * stiffness * rest_squares / (kOfLine * static_cast<double>(rest.size()));
+  return 0.0;
 }
 
 Adequacy adequacy_of(const RecordingFit& fit, const RestedRecording& rested, int parameters,
                      double level) {
   const Recording& r = *rested.recording;
-  const auto end = static_cast<std::ptrdiff_t>(std::min(rested.at_rest, r.time_s.size()));
-  const std::vector<double> rest_time(r.time_s.begin(), r.time_s.begin() + end);
-  const std::vector<double> rest(r.response.begin(), r.response.begin() + end);
+  const std::size_t end = std::min(rested.at_rest, r.time_s.size());
+  std::vector<double> rest_time;
+  std::vector<double> rest;
+  const std::vector<bool> spikes = spikes_at_rest(std::span(r.response).first(end));
+  for (std::size_t i = 0; i < end; ++i) {
+    if (spikes[i]) continue;
+    rest_time.push_back(r.time_s[i]);
+    rest.push_back(r.response[i]);
+  }
   std::vector<double> time;
   std::vector<double> reading;
   std::vector<double> residual;
@@ -103,8 +88,9 @@ Adequacy adequacy_of(const RecordingFit& fit, const RestedRecording& rested, int
     reading.push_back(fit.observed[i]);
     residual.push_back(fit.observed[i] - fit.predicted[i]);
   }
-  const double carried = carried_variance(fit, r, static_cast<std::size_t>(end));
-  return judge_adequacy({rest_time, rest, time, reading, residual, parameters, carried}, level);
+  const double carried = carried_variance(fit, r, end);
+  return judge_adequacy(
+      {rest_time, rest, time, reading, residual, parameters, carried, ramp_end_s(fit)}, level);
 }
 
 /// The drift of a recording that the fit takes, where it is further from what the rests show than
@@ -169,7 +155,13 @@ std::optional<Judged> worst_of(const FitResult& fit, std::span<const RestedRecor
     if (rested[r.choice].recording == nullptr) continue;
     // Two tests share the level where a drift was measured.
     const double each = has_measured_drift(fit, r.choice) ? 0.5 * level : level;
-    Judged one{adequacy_of(r, rested[r.choice], parameters_each(fit), each), r.choice};
+    RestedRecording rest = rested[r.choice];
+    const std::string moving = load_in_air(*rest.recording, rest.at_rest);
+    if (!moving.empty()) rest.at_rest = still_samples(*rest.recording, rest.at_rest);
+    Judged one{adequacy_of(r, rest, parameters_each(fit), each), r.choice};
+    if (!moving.empty() && one.adequacy.described == Described::not_described) {
+      one.adequacy.causes = {{"load_in_air", moving}};
+    }
     one.drift_off = drift_off(fit, r.choice, each);
     const std::string bent = bend_of_rest(rested[r.choice], each);
     if (!bent.empty()) {
@@ -266,7 +258,11 @@ LawAdequacy stated(const FitResult& fit, const Judged& judged, std::size_t tried
   result.verdict = described_name(a.described);
   if (a.described == Described::not_judged) {
     result.summary =
-        "adequacy cannot be judged: too few samples at rest before the load to tell the noise";
+        a.restless
+            ? "adequacy cannot be judged: the readings before the load scatter by more than those "
+              "under it do about the law: they are not at rest, and tell no noise"
+            : "adequacy cannot be judged: too few samples at rest before the load to tell the "
+              "noise";
     return result;
   }
   if (a.noise_sd > 0.0) result.residual_over_noise = a.residual_over_noise;

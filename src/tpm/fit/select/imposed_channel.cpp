@@ -84,6 +84,61 @@ bool crept(std::span<const double> load, std::span<const double> other, double o
          std::abs(moved(load)) / range_of(load) < kMuchLess * by / range_of(other);
 }
 
+/// Samples `first` to before `last` in which a channel stands still.
+struct StillRun {
+  std::size_t first = 0, last = 0;
+  double level = 0.0;
+};
+
+/// Where a load stands still for a twentieth of the time or longer.
+std::vector<StillRun> still_runs(std::span<const double> load, double noise) {
+  constexpr double kStill = 0.005, kSure = 4.0;
+  constexpr std::size_t kFewest = 10, kShare = 20;
+  const double within = kStill * range_of(load) + 2.0 * kSure * noise;
+  const std::size_t least = std::max(kFewest, load.size() / kShare);
+  std::vector<StillRun> runs;
+  for (std::size_t first = 0; first < load.size();) {
+    double low = load[first], high = load[first];
+    std::size_t last = first;
+    while (last < load.size()) {
+      low = std::min(low, load[last]);
+      high = std::max(high, load[last]);
+      if (high - low > within) break;
+      ++last;
+    }
+    if (last - first < least) {
+      ++first;
+      continue;
+    }
+    runs.push_back({first, last, average_of(load.subspan(first, last - first))});
+    first = last;
+  }
+  return runs;
+}
+
+/// True if the load went up in stairs, and the other channel on under the last one: creep.
+bool crept_on_stairs(std::span<const double> load, double load_noise, std::span<const double> other,
+                     double other_noise) {
+  constexpr double kMostly = 0.85, kApart = 0.1;  // of the samples, and of the range
+  const std::vector<StillRun> runs = still_runs(load, load_noise);
+  std::size_t still = 0, stairs = 0;
+  double before = *std::ranges::min_element(load);
+  for (const StillRun& run : runs) {
+    still += run.last - run.first;
+    if (run.level - before <= kApart * range_of(load)) continue;
+    before = run.level;
+    ++stairs;
+  }
+  const auto samples = static_cast<double>(load.size());
+  if (stairs < 2 || static_cast<double>(still) < kMostly * samples) return false;
+  const StillRun& last = runs.back();
+  // crept() looks at the second half of what it is given.
+  const std::size_t length = last.last - last.first;
+  if (last.last < load.size() || 2 * length > load.size()) return false;
+  return crept(load.subspan(load.size() - 2 * length), other.subspan(other.size() - 2 * length),
+               other_noise);
+}
+
 /// Refuses a strain or depth that recedes from its largest under a load that is held: tissue goes
 /// on under a load, and what falls under something held is a force that relaxes. The part of the
 /// fall that the first half holds tells relaxation from a drift, which is straight.
@@ -258,8 +313,11 @@ void find_imposed_channel(PreparedRecording& recording) {
   require_no_recession(recording, c->load, c->load_noise, c->answer, c->answer_noise);
   // Not of a contact: with a noisy force imposed, 500 rows were not answered within a minute.
   const bool slower = c->stretched && crept(c->load, c->answer, c->answer_noise);
-  const bool imposed = was_held(c->load, c->load_noise, c->answer, c->answer_noise) &&
-                       (c->of_answer() > kMuchLess * c->of_load() || slower);
+  const bool stairs =
+      c->stretched && crept_on_stairs(c->load, c->load_noise, c->answer, c->answer_noise);
+  const bool held = was_held(c->load, c->load_noise, c->answer, c->answer_noise) &&
+                    (c->of_answer() > kMuchLess * c->of_load() || slower);
+  const bool imposed = held || stairs;
   if (auto remark = imposed_channel_remark(recording.name, r, imposed)) {
     recording.remarks.push_back(*std::move(remark));
   }

@@ -5,7 +5,8 @@ namespace tpm::fit {
 
 /// Finds which channel of a recording of stress and strain, or of force and depth, was imposed,
 /// before its phases are known: the load if it was held while the strain or depth went on under it
-/// (creep), by much more of its range or in a noisier channel. Drive and response then change
+/// (creep), by much more of its range or in a noisier channel, or if a stress went up in stairs and
+/// the strain on under the last one. Drive and response then change
 /// places, and load_imposed is set: a fit imposes the load and compares the strain or depth.
 /// `remarks` say so, and what it biases if both channels are noisy. Throws Error(bad_input) if the
 /// strain or depth relaxes under a held load: their titles are swapped.

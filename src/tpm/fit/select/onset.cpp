@@ -5,8 +5,11 @@
 #include <array>
 #include <cmath>
 #include <limits>
+#include <span>
+#include <vector>
 
 #include "tpm/fit/select/placement.hpp"
+#include "tpm/fit/spikes_at_rest.hpp"
 
 namespace tpm::fit {
 namespace {
@@ -33,8 +36,9 @@ std::size_t end_of_loading(const PreparedRecording& r) {
 class FirstLoading {
  public:
   /// @param drift of the zero after origin_s, which is taken off
-  FirstLoading(const PreparedRecording& r, std::size_t first, std::size_t last, double length,
-               double drift, double origin_s)
+  /// @param reading responses of the recording
+  FirstLoading(const PreparedRecording& r, std::span<const double> reading, std::size_t first,
+               std::size_t last, double length, double drift, double origin_s)
       : length_(length) {
     constexpr std::size_t kMost = 160;
     const std::size_t block = std::max<std::size_t>((last - first + 1) / kMost, 1);
@@ -43,7 +47,7 @@ class FirstLoading {
       for (std::size_t k = i; k < i + block; ++k) {
         drive += r.recording.drive[k] / static_cast<double>(block);
         const double off = drift * (r.recording.time_s[k] - origin_s);
-        response += (r.recording.response[k] - off) / static_cast<double>(block);
+        response += (reading[k] - off) / static_cast<double>(block);
       }
       drive_.push_back(drive);
       response_.push_back(response);
@@ -291,6 +295,7 @@ Onset find_onset(const PreparedRecording& r, const RestReadings& rests,
   constexpr double kLeast = 1e-4;  // of the travel: nothing is known better
   if (rests.before == 0 || !rests.zero) return stated_onset(r, exponent);
   const std::vector<double>& drive = r.recording.drive;
+  const std::vector<double> reading = without_spikes(r.recording.time_s, r.recording.response);
   const double travel = ramp_travel(r);
   const std::size_t contact = r.phases.contact_index;
   const std::size_t end = end_of_loading(r);
@@ -325,7 +330,7 @@ Onset find_onset(const PreparedRecording& r, const RestReadings& rests,
     const std::size_t lowest =
         std::max(passes(expected - room), begin > 2 * inside ? begin - 2 * inside : 0);
     const std::size_t first = lowest > inside ? lowest - inside : 0;
-    return Part{FirstLoading(r, first, last, share * travel, drift, rests.origin_s),
+    return Part{FirstLoading(r, reading, first, last, share * travel, drift, rests.origin_s),
                 {expected - room, expected + room, rests.noise_sd, rests.phi, zero},
                 inside};
   };

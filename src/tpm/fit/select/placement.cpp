@@ -11,6 +11,7 @@
 #include "tpm/fit/likelihood/load_imposed.hpp"
 #include "tpm/fit/select/pull_after_withdrawal.hpp"
 #include "tpm/fit/select/rest_line.hpp"
+#include "tpm/fit/spikes_at_rest.hpp"
 
 namespace tpm::fit {
 namespace {
@@ -93,22 +94,12 @@ RestSamples rest_samples(const PreparedRecording& r) {
 
 /// Without single readings far off, which are no noise about the zero (as isolated_outliers).
 RestSamples without_outliers(RestSamples rest) {
-  constexpr double kMostShare = 0.05;
-  std::vector<double> off = rest.reading;
-  const double middle = median(off);
-  for (double& each : off) each = std::abs(each - middle);
-  const double far = kFarOff * kOfMedian * median(off);
-  const auto is_far = [&](double reading) { return std::abs(reading - middle) > far; };
-  const auto outliers = std::ranges::count_if(rest.reading, is_far);
-  const double most = std::max(kMostShare * static_cast<double>(off.size()), 1.0);
-  if (!(far > 0.0) || off.size() < kFewestForSlope || static_cast<double>(outliers) > most) {
-    return rest;
-  }
+  const std::vector<bool> spikes = spikes_at_rest(rest.reading);
   RestSamples kept;
   kept.before = rest.before;
   kept.after = rest.after;
   for (std::size_t i = 0; i < rest.reading.size(); ++i) {
-    if (is_far(rest.reading[i])) continue;
+    if (spikes[i]) continue;
     kept.time_s.push_back(rest.time_s[i]);
     kept.reading.push_back(rest.reading[i]);
   }

@@ -21,15 +21,36 @@ struct Outside {
   double last_fitted_s = 0.0;
   std::size_t count = 0, predicted = 0;
   double sum_of_squares = 0.0;
-  double last_drive = 0.0;  ///< of the predicted ones
-  double unknown_s = 0.0;   ///< from here on the law has no answer, if predicted < count
+  double turned_squares = 0.0;  ///< of it, where the response has the other sign
+  double last_drive = 0.0;      ///< of the predicted ones
+  double unknown_s = 0.0;       ///< from here on the law has no answer, if predicted < count
 };
 
+/// Where the fit begins, and the largest predicted response above or below that.
+struct LoadedRange {
+  double zero = 0.0, peak = 0.0;
+};
+
+LoadedRange loaded_range(const RecordingFit& r) {
+  LoadedRange range;
+  bool begun = false;
+  for (std::size_t i = 0; i < r.time_s.size(); ++i) {
+    if (!r.fitted[i] || !std::isfinite(r.predicted[i])) continue;
+    if (!begun) range.zero = r.predicted[i];
+    begun = true;
+    const double rise = r.predicted[i] - range.zero;
+    if (std::abs(rise) > std::abs(range.peak)) range.peak = rise;
+  }
+  return range;
+}
+
 Outside outside_of(const RecordingFit& r) {
+  constexpr double kTurned = 0.02;  // of the peak
   Outside o;
   for (std::size_t i = 0; i < r.time_s.size(); ++i) {
     if (r.fitted[i]) o.last_fitted_s = r.time_s[i];
   }
+  const LoadedRange range = loaded_range(r);
   for (std::size_t i = 0; i < r.time_s.size(); ++i) {
     if (r.time_s[i] <= o.last_fitted_s || r.is_censored(i)) continue;
     ++o.count;
@@ -38,7 +59,10 @@ Outside outside_of(const RecordingFit& r) {
       continue;
     }
     ++o.predicted;
-    o.sum_of_squares += std::pow(r.predicted[i] - r.observed[i], 2);
+    const double square = std::pow(r.predicted[i] - r.observed[i], 2);
+    o.sum_of_squares += square;
+    const double reached = (r.observed[i] - range.zero) * range.peak;
+    if (reached < -kTurned * range.peak * range.peak) o.turned_squares += square;
     o.last_drive = r.drive[i];
   }
   return o;
@@ -138,6 +162,7 @@ std::string later_hold_words(const PreparedRecording& r, const LaterHold& hold,
 std::vector<Remark> outside_remarks(const FitResult& fit) {
   constexpr double kDescribes = 3.0;  // times the residual inside the window
   constexpr std::size_t kFewestOutside = 5;
+  constexpr double kMostly = 0.5;  // of the squares
   std::vector<Remark> remarks;
   for (const RecordingFit& r : fit.recordings) {
     const Outside o = outside_of(r);
@@ -160,7 +185,11 @@ std::vector<Remark> outside_remarks(const FitResult& fit) {
                "off by {} % of the peak (rms){}",
                name, significant(o.last_fitted_s, 4), o.predicted, significant(o.last_drive, 3),
                significant(100.0 * rms / r.peak, 3),
-               describes ? "" : ": the law does not describe the unloading and what follows")});
+               describes ? ""
+               : o.turned_squares > kMostly * o.sum_of_squares
+                   ? ": there the load turns its sign (a specimen that is gripped, glued or "
+                     "sticks), and these laws have none of that sign"
+                   : ": the law does not describe the unloading and what follows")});
     }
     if (o.count >= kFewestOutside) {
       remarks.push_back({"fitted_part", window_words(name, r, o)});

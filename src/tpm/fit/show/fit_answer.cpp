@@ -128,9 +128,12 @@ void add_recordings(ShortAnswer& answer, const SpecimenStudy& study) {
     }
     ++fitted;
     if (!row.fit->adequacy || row.fit->adequacy->is_adequate()) continue;
-    doubts[row.fit->adequacy->is_rejected()
+    const LawAdequacy& adequacy = *row.fit->adequacy;
+    doubts[adequacy.is_rejected()
                ? "the law does not describe them: what is pooled supposes that it did"
-               : "adequacy cannot be judged: too few samples at rest before the load"]
+           : adequacy.summary.find("too few samples") != std::string::npos
+               ? "adequacy cannot be judged: too few samples at rest before the load"
+               : adequacy.summary]
         .push_back(row.name);
   }
   for (const auto& [words, names] : doubts) {

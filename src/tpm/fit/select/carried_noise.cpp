@@ -1,0 +1,54 @@
+#include "tpm/fit/select/carried_noise.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <span>
+#include <vector>
+
+#include "tpm/fit/select/motion_before_load.hpp"
+
+namespace tpm::fit {
+namespace {
+
+constexpr std::size_t kFewestCarried = 10;
+
+/// A value less the line between its neighbours: what noise and corners leave of a course.
+std::vector<double> off_neighbours(std::span<const double> time_s, std::span<const double> values) {
+  std::vector<double> off;
+  for (std::size_t i = 1; i + 1 < values.size(); ++i) {
+    const double share = (time_s[i] - time_s[i - 1]) / (time_s[i + 1] - time_s[i - 1]);
+    off.push_back(values[i] - values[i - 1] - share * (values[i + 1] - values[i - 1]));
+  }
+  return off;
+}
+
+}  // namespace
+
+double carried_variance(const RecordingFit& fit, const Recording& recording, std::size_t at_rest) {
+  if (at_rest < kFewestCarried) return 0.0;
+  std::vector<double> time, imposed, answer;
+  for (std::size_t i = 0; i < fit.time_s.size() && i < recording.drive.size(); ++i) {
+    if (!fit.fitted[i] || !std::isfinite(fit.predicted[i])) continue;
+    time.push_back(fit.time_s[i]);
+    imposed.push_back(recording.drive[i]);
+    answer.push_back(fit.predicted[i]);
+  }
+  const std::vector<double> bends = off_neighbours(time, imposed);
+  const std::vector<double> answers = off_neighbours(time, answer);
+  double squares = 0.0, products = 0.0;
+  for (std::size_t i = 0; i < bends.size(); ++i) {
+    squares += bends[i] * bends[i];
+    products += bends[i] * answers[i];
+  }
+  const std::size_t still = still_samples(recording, at_rest);
+  double rest_squares = 0.0;
+  const std::vector<double> rest = off_neighbours(std::span(recording.time_s).first(still),
+                                                  std::span(recording.drive).first(still));
+  for (const double off : rest) rest_squares += off * off;
+  if (!(squares > 0.0)) return 0.0;
+  constexpr double kOfLine = 1.5;  // a value less the mean of two others has 1.5 times its variance
+  const double stiffness = products / squares;
+  return stiffness * stiffness * rest_squares / (kOfLine * static_cast<double>(rest.size()));
+}
+
+}  // namespace tpm::fit

@@ -1,0 +1,18 @@
+#pragma once
+#include <cstddef>
+#include <string>
+
+#include "tpmkit/curve.hpp"
+
+namespace tpm::fit {
+
+/// How many of the samples before the load the drive stands still in, from the first on; all of
+/// them if it does so in fewer than 10.
+[[nodiscard]] std::size_t still_samples(const Recording& recording, std::size_t at_rest);
+
+/// A load that changes as the probe moves in the air is no drift of the zero: the trend of the
+/// samples before the load is not there while the probe stands still.
+/// @return what is seen; empty unless it is so
+[[nodiscard]] std::string load_in_air(const Recording& recording, std::size_t at_rest);
+
+}  // namespace tpm::fit
