@@ -16,7 +16,7 @@ PATHS = {
     "An organ": ["tpm simulate configs/liver_poke.json -o poke.h5", "tpm view poke.h5", "tpm plan configs/plan/servo.json"],
     "A device": ['tpm hil check --device virtual --loop-rate "1 kHz" --duration "5 s"', "tpm hil run configs/hil_liver.json -o session.tpmrec",
                  "tpm hil verify session.tpmrec", "tpm view session.tpmrec -o session.html"],
-    "A paper": ["tpm paper tables --depths 2,4,6,8 --spacings 20,25,30,35", "tpm paper audit", "tpm paper report --folder paper"],
+    "A paper": ["tpm paper tables --depths \"2,4,6,8 mm\" --spacings \"20,25,30,35 mm\"", "tpm paper audit", "tpm paper report --folder paper"],
 }
 LAST = 10
 
