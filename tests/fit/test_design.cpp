@@ -309,7 +309,7 @@ TEST_CASE("the figures hold a curve per rate, the best candidate and a panel per
 TEST_CASE("the answer of a shipped design has 25 lines at most and leaves out no verdict") {
   for (const char* name : {"design_liver.json", "design_meat.json"}) {
     const DesignResult result =
-        plan(read_design(std::string(TPM_TEST_SOURCE_DIR "/configs/") + name));
+        fit::plan(read_design(std::string(TPM_TEST_SOURCE_DIR "/configs/") + name));
     const DesignCheck check = check_design(result.problem, result.ranked.front().experiment, 10, 0);
     ShortAnswer answer = short_answer(result, &check, 10);
     end_answer(answer, "out", {"design.svg"}, "tpm fit RECORDING.csv");
