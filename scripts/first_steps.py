@@ -16,9 +16,10 @@ PATHS = {
     "An organ": ["tpm simulate configs/liver_poke.json -o poke.h5", "tpm view poke.h5", "tpm plan configs/plan/servo.json"],
     "A device": ['tpm hil check --device virtual --loop-rate "1 kHz" --duration "5 s"', "tpm hil run configs/hil_liver.json -o session.tpmrec",
                  "tpm hil verify session.tpmrec", "tpm view session.tpmrec -o session.html"],
-    "A paper": ["tpm paper tables --depths 2,4,6,8 --spacings 20,25,30,35", "tpm paper audit", "tpm paper report --folder paper"],
+    "A paper": ["tpm paper tables --depths \"2,4,6,8 mm\" --spacings \"20,25,30,35 mm\"", "tpm paper audit", "tpm paper report --folder paper"],
 }
 LAST = 10
+KEPT = "## Figures before and after"
 
 
 def main():
@@ -40,7 +41,9 @@ def main():
                 lines = [line.rstrip() for line in text.rstrip().splitlines()]
                 out += ["", f"`{command}`: exit code {done.returncode}, {took:.1f} s, {len(lines)} lines", ""]
                 out += [f"    {line}".rstrip() for line in lines[-LAST:]]
-    page.write_text("\n".join(out) + "\n", encoding="utf-8")
+    old = page.read_text(encoding="utf-8") if page.exists() else ""
+    kept = old.find(KEPT)  # written by hand
+    page.write_text("\n".join(out) + "\n" + ("\n" + old[kept:] if kept >= 0 else ""), encoding="utf-8")
 
 
 if __name__ == "__main__":

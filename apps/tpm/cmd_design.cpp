@@ -15,6 +15,7 @@
 #include "tpm/fit/show/design_figures.hpp"
 #include "tpm/show/draw.hpp"
 #include "tpm/show/json_table_csv.hpp"
+#include "tpm/show/short_answer.hpp"
 #include "tpmkit/error.hpp"
 
 namespace tpm::app {
@@ -34,14 +35,21 @@ int rank_candidates(const DesignOptions& options, const Session& session) {
     check = check_design(result.problem, result.ranked.front().experiment, sets, seed);
   }
   const DesignCheck* checked = check ? &*check : nullptr;
-  std::string drawn;
-  if (!options.folder.empty()) {
-    drawn = written(session, options.folder, write_figures(options.folder, design_figures(result)));
-  }
+  std::vector<std::string> files;
+  if (!options.folder.empty()) files = write_figures(options.folder, design_figures(result));
   const Json json = to_json(result, checked, top);
-  deliver(
-      session.json() ? answer_text(session, json) : to_terminal_text(result, checked, top) + drawn,
-      options.output);
+  std::string text;
+  if (session.json()) {
+    text = answer_text(session, json);
+  } else if (options.verbose) {
+    text = to_terminal_text(result, checked, top);
+    if (!files.empty()) text += written(session, options.folder, files);
+  } else {
+    ShortAnswer answer = short_answer(result, checked, top);
+    end_answer(answer, options.folder, files, "tpm fit RECORDING.csv");
+    text = to_text(answer);
+  }
+  deliver(text, options.output);
   deliver_csv(json_table_csv(json.at("ranked"), "/expected/parameters"), csv);
   return 0;
 }
@@ -75,6 +83,7 @@ int design(const DesignOptions& options, const Session& session) {
   const char* input = options.design.empty() ? "laws" : "a configuration of a fit";
   refuse("--top", !options.top.empty(), input, "it with a design");
   refuse("--folder", !options.folder.empty(), input, "it with a design");
+  refuse("--verbose", options.verbose, input, "it with a design");
   return options.design.empty() ? check_choice_of_law(options, session)
                                 : check_intervals(options, session);
 }
@@ -97,6 +106,7 @@ void add_design_command(CLI::App& app, Session& session) {
       "2000 of a configuration, 200 of each law); of a design 0 for none, else 10 or more");
   add_seed_option(*command, options->seed, ", or 'clock': the simulations")->capture_default_str();
   add_output_option(*command, options->output);
+  add_verbose_option(*command, options->verbose, "of a design, each candidate and the best pair");
   add_format_option(*command, session);
   const auto add_of_design = options_of_group(*command, "Of a design");
   add_of_design("--top", options->top, "How many to list: candidates (default 10)");

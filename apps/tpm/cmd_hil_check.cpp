@@ -9,6 +9,7 @@
 
 #include "answer.hpp"
 #include "command.hpp"
+#include "common_options.hpp"
 #include "hil_options.hpp"
 #include "interrupt_watch.hpp"
 #include "out_of_memory.hpp"
@@ -24,6 +25,7 @@ namespace {
 struct CheckChoice {
   DeviceOptions device;
   std::string session, rate, duration = "60 s";
+  bool verbose = false;
 };
 
 double within(const std::string& text, Dimension dimension, const char* option, double least,
@@ -73,6 +75,42 @@ JitterCheck checked_hil(const HilSession& hil, const CheckChoice& choice,
   return check;
 }
 
+/// The options that name the device, as they were given.
+std::string device_arguments(const DeviceOptions& device) {
+  std::string text;
+  const auto add = [&](const char* option, const std::string& value) {
+    if (!value.empty()) text += fmt::format(" {} {}", option, shell_word(value));
+  };
+  if (device.choice.kind != "virtual") add("--device", device.choice.kind);
+  add("--serial", device.serial);
+  if (device.index >= 0) add("--index", std::to_string(device.index));
+  add("--dhd-library", device.library);
+  add("--plugin", device.plugin);
+  add("--device-recording", device.replay);
+  add("--device-file", device.file);
+  return text;
+}
+
+/// The session that was asked; without one, the device's delay, or the session that comes with tpm.
+/// None where a session would not begin.
+std::string next_of_check(const JitterCheck& check, const CheckChoice& choice) {
+  if (!check.timing_kept || (check.session && !check.session->accepted)) return {};
+  const std::string device = device_arguments(choice.device);
+  if (check.session) {
+    return fmt::format("tpm hil run {}{} -o session.tpmrec", shell_word(choice.session), device);
+  }
+  return check.device.hardware && choice.device.file.empty()
+             ? fmt::format("tpm hil identify{} -o device.json", device)
+             : fmt::format("tpm hil run configs/hil_liver.json{} -o session.tpmrec", device);
+}
+
+std::string checked_text(const JitterCheck& check, const CheckChoice& choice) {
+  if (choice.verbose) return check_text(check);
+  ShortAnswer answer = short_answer(check);
+  end_answer(answer, "", {}, next_of_check(check, choice));
+  return to_text(answer);
+}
+
 int check_hil(const CheckChoice& choice, const Session& session) {
   constexpr double kLeast_Hz = 100.0, kMost_Hz = 4000.0, kLeast_s = 0.1, kMost_s = 86400.0;
   const DeviceChoice device = chosen_device(choice.device);
@@ -96,7 +134,8 @@ int check_hil(const CheckChoice& choice, const Session& session) {
   }
   std::vector<Verdict> verdicts{{"rate_kept", check.timing_kept}};
   if (check.session) verdicts.push_back({"session_accepted", check.session->accepted});
-  say("{}", session.json() ? answer_text(session, check_json(check), verdicts) : check_text(check));
+  say("{}", session.json() ? answer_text(session, check_json(check), verdicts)
+                           : checked_text(check, choice));
   if (check.outcome.cause == StopCause::signal) return InterruptWatch::exit_code();
   return exit_code(check.timing_kept && (!check.session || check.session->accepted));
 }
@@ -117,6 +156,7 @@ void add_hil_check_command(CLI::App& hil, Session& session) {
       "Rate of the servo loop, without a session: 100 Hz to 4 kHz (default: 1 kHz)");
   command->add_option("--duration", choice->duration, "Duration, of the test")
       ->capture_default_str();
+  add_verbose_option(*command, choice->verbose, "the distribution of the wake-up latency, too");
   add_format_option(*command, session);
   command->footer(
       "Examples:\n  tpm hil check configs/hil_liver.json --device omega7\n"

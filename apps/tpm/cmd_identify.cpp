@@ -1,16 +1,19 @@
 // tpm identify: a recording identified sample by sample, as if it were being made.
 #include <fmt/format.h>
 
+#include <filesystem>
 #include <memory>
 
 #include "answer.hpp"
 #include "command.hpp"
 #include "common_options.hpp"
 #include "recording_options.hpp"
+#include "tpm/base/text.hpp"
 #include "tpm/fit/online/identification.hpp"
 #include "tpm/fit/online/identified_loop.hpp"
 #include "tpm/fit/show/identification_report.hpp"
 #include "tpm/show/json_table_csv.hpp"
+#include "tpm/show/short_answer.hpp"
 #include "tpmkit/units.hpp"
 
 namespace tpm::app {
@@ -21,7 +24,7 @@ struct IdentifyCommand {
   std::vector<std::string> laws;
   std::string target = "10%", patience = "1.3", level = "0.95", reference, seed = "0";
   std::string folder, output;
-  bool no_loop = false;
+  bool no_loop = false, verbose = false;
 };
 
 IdentifyOptions identify_options(const IdentifyCommand& command, Quantity drive) {
@@ -40,6 +43,16 @@ IdentifyOptions identify_options(const IdentifyCommand& command, Quantity drive)
   return options;
 }
 
+/// The law in a session; of a strip the law in another program. Without a folder, the command that
+/// writes one.
+std::string next_of_identify(const IdentifyCommand& command, Quantity drive) {
+  if (command.folder.empty()) return "the same with --folder identified";
+  const std::string law = shell_word((std::filesystem::path(command.folder) / "law.json").string());
+  return drive == Quantity::indentation_depth
+             ? fmt::format("tpm hil run configs/hil_law.json --law {} -o session.tpmrec", law)
+             : fmt::format("tpm export {} --to febio", law);
+}
+
 int run_identify(const IdentifyCommand& command, const Session& session) {
   will_write_into(command.folder, {"identification.json", "law.json", "figures.json"});
   const auto csv = csv_beside(command.output, session);
@@ -48,16 +61,24 @@ int run_identify(const IdentifyCommand& command, const Session& session) {
   const Identification id = identify(recording, identify_options(command, drive));
   Json json = to_json(id);
   std::string text = to_terminal_text(id);
+  ShortAnswer answer = short_answer(id);
   if (!command.no_loop && drive == Quantity::indentation_depth) {
     const IdentifiedLoop loop = replay_in_loop(id, recording, {});
     json["loop"] = to_json(loop);
     text += "\n" + to_terminal_text(loop);
+    answer.limits.push_back(loop_words(loop));
   }
-  if (session.json()) text = answer_text(session, json);
+  std::vector<std::string> files;
   if (!command.folder.empty()) {
-    text += written(
-        session, command.folder,
-        write_identification_report(command.folder, id, identified_law(id, recording), json));
+    files = write_identification_report(command.folder, id, identified_law(id, recording), json);
+  }
+  if (session.json()) {
+    text = answer_text(session, json);
+  } else if (!command.verbose) {
+    end_answer(answer, command.folder, files, next_of_identify(command, drive));
+    text = to_text(answer);
+  } else if (!files.empty()) {
+    text += written(session, command.folder, files);
   }
   deliver(text, command.output);
   deliver_csv(json_table_csv(json.at("history"), "/parameters"), csv);
@@ -94,6 +115,7 @@ void add_identify_command(CLI::App& app, Session& session) {
   command->add_flag("--no-loop", options->no_loop,
                     "Do not hand the laws over to a model in the loop");
   add_folder_option(*command, options->folder, ": identification.json, law.json and the figure");
+  add_verbose_option(*command, options->verbose, "estimates over time, every hand-over");
   add_output_option(*command, options->output);
   add_recording_options(*command, options->recordings);
   add_format_option(*command, session);

@@ -32,20 +32,12 @@ struct TableOptions {
   std::string format = "text";
 };
 
-/// A quantity with its unit, or a plain number in the unit that the tables use.
-double in_unit(const std::string& text, std::string_view usual_unit, std::string_view option) {
-  const Unit unit = parse_unit(usual_unit, option);
-  const bool plain = text.find_first_not_of("0123456789.+-eE") == std::string::npos;
-  return plain ? option_number(text, option) * unit.to_si
-               : option_quantity(text, unit.dimension, option);
-}
-
-void set(double& target, const std::optional<std::string>& text, std::string_view usual_unit,
+void set(double& target, const std::optional<std::string>& text, Dimension dimension,
          std::string_view option) {
-  if (text) target = in_unit(*text, usual_unit, option);
+  if (text) target = option_quantity(*text, dimension, option);
 }
 
-/// "2,4,6 mm" or "2 mm, 0.4 cm": a unit after the last number holds for those without one.
+/// "2,4,6 mm" or "2 mm, 0.4 cm": the unit after the last number holds for those without one.
 std::vector<double> lengths(const std::string& text, std::string_view option) {
   std::vector<std::string> parts;
   std::size_t from = 0;
@@ -54,11 +46,12 @@ std::vector<double> lengths(const std::string& text, std::string_view option) {
     parts.emplace_back(trimmed(std::string_view(text).substr(from, end - from)));
     from = end + 1;
   }
-  const std::string_view last = split_quantity(parts.back()).unit;
-  const std::string unit(last.empty() ? "mm" : last);
-  of_option([&] { return parse_unit(unit, Dimension::length, option); });
-  return mapped<double>(parts,
-                        [&](const std::string& part) { return in_unit(part, unit, option); });
+  const std::string unit(split_quantity(parts.back()).unit);
+  return mapped<double>(parts, [&](const std::string& part) {
+    const bool has_unit = !split_quantity(part).unit.empty();
+    const std::string full = has_unit || unit.empty() ? part : part + " " + unit;
+    return option_quantity(full, Dimension::length, option);
+  });
 }
 
 TableRequest request_of(const TableOptions& options) {
@@ -70,15 +63,16 @@ TableRequest request_of(const TableOptions& options) {
   if (options.depths) request.depths_m = lengths(*options.depths, "--depths");
   if (options.spacings) request.spacings_m = lengths(*options.spacings, "--spacings");
   TpmParameters& p = request.parameters;
-  for (double* modulus : {&p.E1_Pa, &p.E2_Pa, &p.Eprime_Pa}) set(*modulus, options.E, "kPa", "--E");
-  set(p.E1_Pa, options.E1, "kPa", "--E1");
-  set(p.E2_Pa, options.E2, "kPa", "--E2");
-  set(p.Eprime_Pa, options.Eprime, "kPa", "--Eprime");
-  set(p.eta1_Pa_s, options.eta, "Pa s", "--eta");
-  set(p.A0_m2, options.A0, "mm^2", "--A0");
-  set(p.l0_m, options.l0, "mm", "--l0");
-  set(request.rate_m_per_s, options.rate, "mm/s", "--rate");
-  set(request.hold_s, options.hold, "s", "--hold");
+  for (double* modulus : {&p.E1_Pa, &p.E2_Pa, &p.Eprime_Pa})
+    set(*modulus, options.E, Dimension::stress, "--E");
+  set(p.E1_Pa, options.E1, Dimension::stress, "--E1");
+  set(p.E2_Pa, options.E2, Dimension::stress, "--E2");
+  set(p.Eprime_Pa, options.Eprime, Dimension::stress, "--Eprime");
+  set(p.eta1_Pa_s, options.eta, Dimension::viscosity, "--eta");
+  set(p.A0_m2, options.A0, Dimension::area, "--A0");
+  set(p.l0_m, options.l0, Dimension::length, "--l0");
+  set(request.rate_m_per_s, options.rate, Dimension::speed, "--rate");
+  set(request.hold_s, options.hold, Dimension::time, "--hold");
   return request;
 }
 
@@ -125,8 +119,9 @@ void add_options(CLI::App& command, TableOptions& options) {
                    "Tables as printed: a step, Eqs. 15 and 16, t -> infinity (default)");
   command.add_flag("--consistent", options.consistent,
                    "Ramp-and-hold with the true eta1: end of ramp and end of hold");
-  command.add_option("--depths", options.depths, "Indentation depths (default 2,4,6,8 mm)");
-  command.add_option("--spacings", options.spacings, "Sphere spacings x (default 20,25,30,35 mm)");
+  command.add_option("--depths", options.depths, "Indentation depths (default \"2,4,6,8 mm\")");
+  command.add_option("--spacings", options.spacings,
+                     "Sphere spacings x (default \"20,25,30,35 mm\")");
   command.add_option("--E", options.E, "Modulus of all springs: E1, E2 and E' (default 12 kPa)");
   command.add_option("--E1", options.E1, "Spring of the Kelvin-Voigt unit");
   command.add_option("--E2", options.E2, "Series spring");
@@ -152,8 +147,8 @@ void add_tables_command(CLI::App& paper, Session& session) {
   const auto options = std::make_shared<TableOptions>();
   add_options(*command, *options);
   command->footer(
-      "Plain numbers are mm, kPa, Pa s, mm^2, mm/s and s; other units go with the number.\n"
-      "Example:\n  tpm paper tables --depths 2,4,6,8 --spacings 20,25,30,35 --E \"12 kPa\"\n"
+      "Example:\n  tpm paper tables --depths \"2,4,6,8 mm\" --spacings \"20,25,30,35 mm\" --E \"12 "
+      "kPa\"\n"
       "  tpm paper tables --consistent --eta \"2e5 Pa s\" --rate \"2 mm/s\" --format md");
   set_run(*command, session, [options, &session] { return run_command(*options, session); });
 }

@@ -12,6 +12,7 @@
 #include "law_spectrum.hpp"
 #include "protocol_options.hpp"
 #include "recording_options.hpp"
+#include "tpm/base/text.hpp"
 #include "tpm/files/json.hpp"
 #include "tpm/files/other_kind.hpp"
 #include "tpm/fit/predict/law_prediction.hpp"
@@ -78,6 +79,18 @@ void require_only_frequencies(const PredictOptions& options) {
   }
 }
 
+/// A comparison with readings, where there are some; else the law where it is used.
+std::string next_of_prediction(const PredictOptions& options, const LawPrediction& prediction) {
+  const std::string subject = shell_word(options.law);
+  if (prediction.recording) {
+    return fmt::format("tpm validate {} {}", subject, shell_word(options.recordings.files.front()));
+  }
+  if (is_organ_document(read_json_of(options.law, "law"))) return "tpm plan " + subject;
+  return is_answered_by_stress(prediction.spec.drive)
+             ? fmt::format("tpm export {} --to febio", subject)
+             : fmt::format("tpm hil run configs/hil_law.json --law {} -o session.tpmrec", subject);
+}
+
 int predict(const PredictOptions& options, const Session& session) {
   if (!options.frequencies.empty()) {
     require_only_frequencies(options);
@@ -104,6 +117,7 @@ int predict(const PredictOptions& options, const Session& session) {
     text +=
         written(session, options.folder, write_prediction_report(options.folder, prediction, json));
   }
+  if (!session.json()) text += fmt::format("next: {}\n", next_of_prediction(options, prediction));
   deliver(text, options.output);
   deliver_csv(to_csv(prediction), csv);
   return 0;

@@ -116,6 +116,12 @@ WrittenSweep write_results(const Sweep& sweep, const SweepRun& run,
   return written;
 }
 
+/// The command that looks at the results, or why cells have none.
+std::string next_of_sweep(const CellTally& tally, const std::string& file) {
+  return tally.done > 0 ? fmt::format("tpm sweep plot {}", shell_word(file))
+                        : fmt::format("tpm sweep show {}", shell_word(file));
+}
+
 /// @returns the exit code: a sweep of which no cell has an answer has none either
 int print_results(const Sweep& sweep, const CellTally& tally, const std::vector<std::string>& files,
                   const Session& session) {
@@ -129,6 +135,7 @@ int print_results(const Sweep& sweep, const CellTally& tally, const std::vector<
     text += fmt::format("- and {} more reasons: /reasons\n", tally.reasons.size() - kShown);
   }
   say_with_files(session, tally_json(sweep, tally), text, files);
+  if (!session.json()) say("next: {}\n", next_of_sweep(tally, files.front()));
   return exit_code(tally.done > 0 || tally.failed == 0);
 }
 
@@ -189,8 +196,8 @@ void require_same_count(const fs::path& output, const Shard& shard) {
   }
 }
 
-int run_shard(const Sweep& sweep, const fs::path& output, SweepControls controls,
-              const Session& session) {
+int run_shard(const Sweep& sweep, const std::string& sweep_file, const fs::path& output,
+              SweepControls controls, const Session& session) {
   require_same_count(output, controls.shard);
   const fs::path file = shard_path(output, controls.shard);
   will_write({file.string() + ".run.json"}, session.output_naming);
@@ -203,8 +210,12 @@ int run_shard(const Sweep& sweep, const fs::path& output, SweepControls controls
   if (session.json()) {
     say("{}", answer_text(session, Json{{"file", file.string()}, {"blocks", run.blocks}}));
   } else {
-    say("shard {} of {}: {} of {} blocks in {}\n", shard.index + 1, shard.count, run.blocks,
-        sweep.blocks(), file.string());
+    const std::string words = shell_word(sweep_file), into = shell_word(output.string());
+    say("shard {} of {}: {} of {} blocks in {}\nnext: {}\n", shard.index + 1, shard.count,
+        run.blocks, sweep.blocks(), file.string(),
+        shard.index + 1 == shard.count ? fmt::format("tpm sweep merge {} -o {}", words, into)
+                                       : fmt::format("tpm sweep {} --shard {}/{} -o {}", words,
+                                                     shard.index + 2, shard.count, into));
   }
   return 0;
 }
@@ -290,7 +301,7 @@ int run_command(const SweepChoice& choice, const Session& session) {
       throw Error(ExitCode::usage, "--shard", "under mpirun", "one way of sharing the work");
     }
     controls.shard = parse_shard(choice.shard);
-    return run_shard(sweep, output, std::move(controls), session);
+    return run_shard(sweep, choice.sweep, output, std::move(controls), session);
   }
   const int workers = controls.workers;
   BlockLog log(log_file, sweep, say_note);

@@ -11,6 +11,7 @@
 #include "common_options.hpp"
 #include "plan_options.hpp"
 #include "recording_options.hpp"
+#include "tpm/base/text.hpp"
 #include "tpm/files/file.hpp"
 #include "tpm/files/file_roles.hpp"
 #include "tpm/files/instrument.hpp"
@@ -332,6 +333,29 @@ int recheck(const std::string& page, const std::string& output, const Session& s
   return exit_code(changes.empty());
 }
 
+/// A recording that was not fitted, a requirement, or where the law or organ is used; if it is not
+/// adequate, a law of these recordings.
+std::string next_of_validation(const ValidateOptions& options, const Validation& validation) {
+  const std::string subject = shell_word(options.law);
+  const std::string compared = shell_word(options.recordings.files.front());
+  switch (validation.verdict) {
+    case ModelVerdict::residual:
+      return fmt::format("tpm validate {} OTHER_RECORDING.csv --require 10%", subject);
+    case ModelVerdict::adequate:
+      break;
+    default:
+      if (validation.requirement.empty()) {
+        return fmt::format("tpm validate {} {} --require 10%", subject, compared);
+      }
+      return is_session(options.recordings.files.front()) ? "tpm hil verify " + compared
+                                                          : "tpm fit " + compared;
+  }
+  if (is_organ_document(read_json_of(options.law, "law"))) return "tpm plan " + subject;
+  return is_session(options.recordings.files.front())
+             ? "tpm view " + compared
+             : fmt::format("tpm budget {} {}", subject, compared);
+}
+
 int run_validate(const ValidateOptions& options, const Session& session) {
   if (!options.recheck.empty()) {
     if (!options.law.empty() || !options.credibility.empty() || !options.folder.empty()) {
@@ -366,6 +390,9 @@ int run_validate(const ValidateOptions& options, const Session& session) {
   if (!options.credibility.empty()) {
     write_file(options.credibility, page);
     if (!session.json()) text += fmt::format("written: {}\n", options.credibility);
+  }
+  if (!session.json()) {
+    text += fmt::format("next: {}\n", next_of_validation(options, validation));
   }
   deliver(text, options.output);
   deliver_csv(to_csv(validation), csv);

@@ -18,6 +18,7 @@ struct DesignOptions {
   std::string family, noise, order;
   std::vector<std::string> margins;
   std::string output;
+  bool verbose = false;
 };
 
 /// --seed: a number, or 'clock' for one that differs from run to run.

@@ -1,5 +1,6 @@
 // Designs of experiments: Fisher information against hand calculation and against the covariance of
 // an actual fit, rankings that are known analytically, limits, correlated noise, bad input.
+#include <algorithm>
 #include <catch2/catch.hpp>
 #include <cmath>
 
@@ -300,6 +301,24 @@ TEST_CASE("the figures hold a curve per rate, the best candidate and a panel per
   CHECK(best.x == std::vector{result.ranked.front().experiment.hold_s});
   CHECK(figures[0].panels[0].series[0].provenance == "model");
   CHECK_NOTHROW(to_json(figures));
+}
+
+TEST_CASE("the answer of a shipped design has 25 lines at most and leaves out no verdict") {
+  for (const char* name : {"design_liver.json", "design_meat.json"}) {
+    const DesignResult result =
+        fit::plan(read_design(std::string(TPM_TEST_SOURCE_DIR "/configs/") + name));
+    const DesignCheck check = check_design(result.problem, result.ranked.front().experiment, 10, 0);
+    ShortAnswer answer = short_answer(result, &check, 10);
+    end_answer(answer, "out", {"design.svg"}, "tpm fit RECORDING.csv");
+    const std::string text = to_text(answer);
+    INFO(text);
+    CHECK(std::count(text.begin(), text.end(), '\n') <= 25);
+    CHECK_THAT(text, Contains(experiment_words(result.ranked.front().experiment)));
+    for (const std::string& words : result.summary) CHECK_THAT(text, Contains(words));
+    for (const Remark& remark : check.remarks) CHECK_THAT(text, Contains(remark.text));
+    const std::string whole = to_terminal_text(result, &check, 10);
+    CHECK(std::count(whole.begin(), whole.end(), '\n') > 25);
+  }
 }
 
 TEST_CASE("bad designs are named") {

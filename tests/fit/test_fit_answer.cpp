@@ -180,6 +180,21 @@ TEST_CASE("a unit fits the size of its value, and one that takes no prefix stays
   CHECK(sized_text({"mN/s", Dimension::force, 1e-3}, 1e-9, 4) == "1 nN/s");
 }
 
+TEST_CASE("screen, figure and JSON count the same starts at the best minimum", "[fit][answer]") {
+  const Selection s = selected_at_scale(1.0);
+  const FitResult& fit = s.candidates[s.recommended].fit;
+  // Contact and offset are near zero: a share of them is no measure of agreement.
+  REQUIRE(fit.waterfall.clusters.size() > 1);
+  const auto at_best = std::ranges::count(fit.waterfall.clusters, 0);
+  CHECK(fit.starts_agreeing == at_best);
+  CHECK_THAT(printed_answer(s), Contains(fmt::format("{} of {} followed starts end at this minimum",
+                                                     at_best, fit.starts_run)));
+  CHECK_THAT(waterfall_figure(fit).caption,
+             Contains(fmt::format("{} of {} starts end at the best minimum", at_best,
+                                  fit.waterfall.starts)));
+  CHECK(to_json(fit).at("starts").at("agreeing_to_5_digits") == at_best);
+}
+
 TEST_CASE("ends of starts that agree are drawn on the axis on which they count as one") {
   FitResult fit;
   fit.waterfall = waterfall(std::vector<double>{3.0, 3.0 + 1e-12, 3.0 + 2e-12});

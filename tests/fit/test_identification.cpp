@@ -1,6 +1,7 @@
 // Identification sample by sample: whitening and REML against dense algebra, the sequential fit
 // against the batch fit, nothing of the future, hand-over without energy.
 #include <Eigen/Dense>
+#include <algorithm>
 #include <catch2/catch.hpp>
 #include <cmath>
 
@@ -234,6 +235,24 @@ TEST_CASE("the identified law carries its covariance to predictions") {
   CHECK(law.uncertainty->noise.absolute == id.result().estimate.sigma);
   const LawPrediction p = predict_recording(law, recording, {});
   CHECK(*p.recording->held_out.share_in_reading_band > 0.9);
+}
+
+TEST_CASE("the answer of an identification has 25 lines at most, in units of its size") {
+  const PreparedRecording recording = simulated_law("linear-1", 0.01, 0.0, 11);
+  const Identification id = identify(recording, only("linear-1"));
+  ShortAnswer answer = short_answer(id);
+  answer.limits.push_back(loop_words(replay_in_loop(id, recording, {})));
+  end_answer(answer, "identified", {"law.json"}, "tpm hil run configs/hil_law.json");
+  const std::string text = to_text(answer);
+  INFO(text);
+  CHECK(std::count(text.begin(), text.end(), '\n') <= 25);
+  CHECK_THAT(text, Catch::Contains(id.stopped ? "stopped at " : "at the end, "));
+  for (const SequentialParameter& p : id.result().estimate.parameters) {
+    CHECK_THAT(text, Catch::Contains("\n" + p.parameter.name + " "));
+  }
+  for (const Remark& remark : id.remarks) CHECK_THAT(text, Catch::Contains(remark.text));
+  CHECK(text.find("e-0") == std::string::npos);
+  CHECK_THAT(text, Catch::Contains("the first law entered the loop at "));
 }
 
 TEST_CASE("stored energy never rises by more than the work") {

@@ -144,9 +144,9 @@ TEST_CASE("the waterfall sorts, clusters and counts the ends of the starts") {
   const Waterfall w = waterfall(ends);
   CHECK(w.deviances == std::vector<double>{10.0, 10.000001, 10.05, 12.0, 12.0, 300.0});
   CHECK(w.clusters == std::vector<int>{0, 0, 1, 2, 2, 3});
-  CHECK(w.summary == "3 of 7 starts within 0.1 of the best; 4 distinct minima, 1 failed");
+  CHECK(w.summary == "2 of 7 starts end at the best minimum; 4 distinct minima, 1 failed");
   CHECK(waterfall(std::vector<double>{nan}).summary == "none of 1 starts ended in a usable point");
-  CHECK(waterfall({}).near_best == 0);
+  CHECK(waterfall({}).at_best == 0);
 }
 
 TEST_CASE("simple trade-offs are named by what remains known") {

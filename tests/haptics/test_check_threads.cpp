@@ -1,6 +1,7 @@
 // tpm hil check: the time that machine and device keep, and the gate of the session that is named.
 #include <sys/wait.h>
 
+#include <algorithm>
 #include <catch2/catch.hpp>
 #include <chrono>
 #include <fstream>
@@ -202,6 +203,33 @@ TEST_CASE("Text and JSON of a check say the same of time and session") {
   CHECK(session.at("accepted") == false);
   CHECK_THAT(text, Contains("session: short: refused: " + session.at("verdict").get<std::string>() +
                             "\n"));
+}
+
+TEST_CASE("The answer of a check has 25 lines at most, its verdicts first") {
+  JitterCheck check;
+  check.rate_Hz = 1000.0;
+  check.watchdog_s = check.cycle_timeout_s = 0.008;
+  check.late_limit = 100;
+  check.missed_limit = 50;
+  check.outcome.cause = StopCause::finished;
+  check.outcome.cycles = 14;
+  for (int power = 0; power < 14; ++power) check.outcome.woke_late.note(1'000LL << power);
+  check.findings.push_back({"told", "something that the device tells"});
+  assess(check);
+  check.session = ask_session_gate(test::parsed(test::short_session()), device_without_a_file(),
+                                   RealTimeWish::ignore);
+  const auto lines = [](const std::string& text) { return std::ranges::count(text, '\n'); };
+  REQUIRE(lines(check_text(check)) > 25);  // with the histogram
+  show::ShortAnswer answer = short_answer(check);
+  show::end_answer(answer, "", {}, "tpm hil run session.json");
+  const std::string text = show::to_text(answer);
+  INFO(text);
+  CHECK(lines(text) <= 25);
+  CHECK(text.starts_with("timing: " + check.timing + "\nsession: short: refused: "));
+  CHECK_THAT(text, Contains("\n! the device noticed: something that the device tells\n") &&
+                       Contains("\n" + check.advice + "\n") && Contains(" cycles, ") &&
+                       Contains("watchdog 8 ms"));
+  CHECK(text.ends_with("\nmore: --verbose; next: tpm hil run session.json\n"));
 }
 
 TEST_CASE("tpm hil check ends as tpm hil run does where that refuses") {

@@ -17,6 +17,8 @@ PLANS = (("shallow.json", "--tolerance", "1%", "--loop-rate", "1 kHz"), ("servo.
          ("servo.json", "--wall", "1e-9 s per s"), ("tool.json", "--brief"), ("patch_field.json", "--outputs", "field", "--brief"))
 SCENES = ("liver_poke.json", "grasp.json", "sagging_liver.json", "two_indenters.json", "plan/fast_poke.json")
 
+LONG_PLANNED = ("hil_fine.json", "hil_network.json", "hil_planned.json", "hil_surface.json")  # the gate plans: minutes
+
 
 class Checks:
     def __init__(self, program, folder):
@@ -26,6 +28,17 @@ class Checks:
     def run(self, *words):
         return subprocess.run([self.program, *map(str, words)], cwd=self.folder, capture_output=True, text=True, check=False,
                               timeout=500)
+
+    def check_next(self, words, command, codes=(0,)):
+        """An answer that is short anyhow: at most 25 lines, the last of them the next command."""
+        said = self.run(*words)
+        name = " ".join(map(str, words))
+        self.answers += 1
+        lines = said.stdout.splitlines()
+        if said.returncode not in codes:
+            self.faults.append(f"{name}: ends with {said.returncode}: {said.stderr[-300:]}")
+        elif len(lines) > MOST or lines[-1] != f"next: {command}":
+            self.faults.append(f"{name}: {len(lines)} lines, ends with '{lines[-1]}'")
 
     def check(self, words, warnings, codes=(0,)):
         """@param warnings  of the JSON: a function of the document"""
@@ -80,7 +93,7 @@ def main():
         checks = Checks(program, folder)
         checks.check(["paper", "audit"], failed_claims)
         checks.check(["paper", "tables"], lambda d: [])
-        checks.check(["paper", "tables", "--consistent", "--depths", "1,2,3,4,5,6,7,8"], lambda d: [])
+        checks.check(["paper", "tables", "--consistent", "--depths", "1,2,3,4,5,6,7,8 mm"], lambda d: [])
         for plan, *options in PLANS:
             checks.check(["plan", root / "configs/plan" / plan, "--costs", "nominal", *options], remarks, (0, 1))
         for scene in SCENES:
@@ -92,6 +105,14 @@ def main():
         if len(told) > MOST or told[-1:] != ["next: tpm hil verify session.tpmrec"]:
             checks.faults.append(f"hil run: {len(told)} lines, ends with {told[-1:]}")
         checks.check(["hil", "verify", "session.tpmrec"], remarks)
+        checks.check(["hil", "check", "--duration", "0.2 s"], lambda d: [d["timing"], d["advice"]], (0, 1))
+        for session in sorted((root / "configs").glob("hil_*.json")):
+            if session.name in LONG_PLANNED:
+                continue
+            checks.check(["hil", "check", session, "--duration", "0.2 s"], lambda d: [d["session"]["title"]], (0, 1))
+        for design in ("design_liver.json", "design_meat.json"):
+            checks.check(["design", root / "configs" / design, "--repetitions", "10"],
+                         lambda d: d["summary"] + remarks(d["check"]))
         for more in ([], ["--verbose"]):
             told = checks.run("hil", "report", "session.tpmrec", "--folder", "page", "--overwrite", *more).stdout
             line = next((one for one in told.splitlines() if one.startswith("written to page: ")), ": ")
@@ -103,6 +124,27 @@ def main():
                      lambda d: [])
         checks.check(["fit", "healthy/liver1.csv", "--laws", "linear-1", "--folder", "fitted"], remarks)
         checks.check(["fit", "fitted/config.json"], remarks)
+        checks.check(["identify", "healthy/liver1.csv", "--laws", "linear-1"], remarks)
+        checks.check(["identify", "healthy/liver1.csv", "--laws", "linear-1", "--folder", "identified"], remarks)
+        law = "fitted/law.json"
+        checks.check_next(["predict", law, "--depth", "4 mm", "--rate", "2 mm/s", "--hold", "5 s"],
+                          f"tpm hil run configs/hil_law.json --law {law} -o session.tpmrec")
+        checks.check_next(["predict", law, "healthy/liver2.csv"], f"tpm validate {law} healthy/liver2.csv")
+        checks.check_next(["validate", law, "healthy/liver1.csv"],
+                          f"tpm validate {law} OTHER_RECORDING.csv --require 10%")
+        checks.check_next(["validate", law, "healthy/liver2.csv"], f"tpm validate {law} healthy/liver2.csv --require 10%")
+        checks.check_next(["validate", law, "healthy/liver2.csv", "--require", "50%", "--folder", "validated"],
+                          f"tpm budget {law} healthy/liver2.csv")
+        checks.check_next(["validate", law, "fibrotic/liver3.csv", "--require", "1%"], "tpm fit fibrotic/liver3.csv", (1,))
+        sweep = root / "configs/sweep_x_depth.json"
+        checks.check_next(["sweep", sweep, "-o", "sweep.h5"], "tpm sweep plot sweep.h5")
+        checks.check_next(["sweep", sweep, "--shard", "1/2", "-o", "parts.h5"], f"tpm sweep {sweep} --shard 2/2 -o parts.h5")
+        checks.check_next(["sweep", sweep, "--shard", "2/2", "-o", "parts.h5"], f"tpm sweep merge {sweep} -o parts.h5")
+        starts = json.loads(checks.run("fit", "fitted/config.json", "--no-draw", "--format", "json").stdout)["starts"]
+        count = f"{starts['agreeing_to_5_digits']} of {starts['run']}"
+        if (f"{count} followed starts" not in checks.run("fit", "fitted/config.json", "--no-draw").stdout
+                or f"{count} starts end at the best minimum" not in starts["summary"]):
+            checks.faults.append(f"fit: screen, figure and JSON count starts differently: {starts}")
         checks.check(["budget", "fitted/law.json", "healthy/liver1.csv", "--folder", "budget"], remarks)
         checks.check(["budget", "fitted/law.json", "--depth", "4 mm", "--rate", "2 mm/s", "--hold", "5 s", "--scene",
                       root / "configs/budget_liver.json"], remarks)

@@ -231,10 +231,10 @@ inline std::vector<ErrorCase> scene_cases() {
 inline std::vector<ErrorCase> table_option_cases() {
   const std::string type = "options of tpm paper tables";
   return {
-      {type, "depth that overflows", "paper tables --depths 1e300 -o {}/out", with_files({})},
+      {type, "depth that overflows", "paper tables --depths '1e300 mm' -o {}/out", with_files({})},
       {type, "depth in newtons", "paper tables --depths '2,8 N' -o {}/out", with_files({})},
-      {type, "infinite depth", "paper tables --depths 1e400 -o {}/out", with_files({})},
-      {type, "depth without unit", "paper tables --depths inf -o {}/out", with_files({})},
+      {type, "infinite depth", "paper tables --depths '1e400 mm' -o {}/out", with_files({})},
+      {type, "depth without unit", "paper tables --depths 2,8 -o {}/out", with_files({})},
   };
 }
 

@@ -15,8 +15,7 @@ namespace {
 
 constexpr Eigen::Index kMostProfiled = 20'000;  // residuals that profiles are walked with
 
-constexpr double kSameDeviance = 1e-5;   // relative: one minimum
-constexpr double kSameParameter = 1e-5;  // relative: five digits
+constexpr double kSameDeviance = 1e-5;  // relative: one minimum
 
 bool same_deviance(double a, double b) {
   return std::abs(a - b) <= kSameDeviance * std::max(1.0, std::abs(b));
@@ -25,7 +24,7 @@ bool same_deviance(double a, double b) {
 /// All starts, each followed to its end, sorted into distinct minima.
 struct MultiStart {
   std::vector<DistinctMinimum> minima;
-  int run = 0, failed = 0, agreeing = 0;
+  int run = 0, failed = 0;
   std::vector<double> end_deviances;  ///< of every start; NaN where it failed
 };
 
@@ -78,15 +77,6 @@ MultiStart run_starts(const ResidualFunction& function, std::span<const FitParam
   }
   std::ranges::stable_sort(ends, {}, &Minimum::deviance);
   for (const Minimum& m : ends) add_to_cluster(result.minima, m);
-  const Minimum& best = ends.front();
-  for (const Minimum& m : ends) {
-    bool agrees = same_deviance(m.deviance, best.deviance);
-    for (std::size_t i = 0; i < parameters.size(); ++i) {
-      agrees = agrees && std::abs(m.natural[i] - best.natural[i]) <=
-                             kSameParameter * std::abs(best.natural[i]);
-    }
-    if (agrees) ++result.agreeing;
-  }
   return result;
 }
 
@@ -221,8 +211,8 @@ FitResult fit_residuals(const ResidualFunction& function, std::vector<FitParamet
   MultiStart multi = run_starts(function, parameters, starts, kind);
   result.starts_run = multi.run;
   result.starts_failed = multi.failed;
-  result.starts_agreeing = multi.agreeing;
   result.waterfall = waterfall(multi.end_deviances);
+  result.starts_agreeing = result.waterfall.at_best;
   result.minima = std::move(multi.minima);
   result.best = result.minima.front().minimum;
   if (noise) noise(result.best.natural, threshold);

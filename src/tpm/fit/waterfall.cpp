@@ -7,7 +7,6 @@
 #include <iterator>
 
 #include "tpm/base/namespaces.hpp"
-#include "tpm/base/text.hpp"
 
 namespace tpm::fit {
 namespace {
@@ -35,24 +34,21 @@ std::string waterfall_words(const Waterfall& w) {
   if (w.deviances.empty())
     return fmt::format("none of {} starts ended in a usable point", w.starts);
   const int distinct = w.clusters.back() + 1;
-  return fmt::format("{} of {} starts within {} of the best; {} distinct {}, {} failed",
-                     w.near_best, w.starts, significant(w.margin, 3), distinct,
-                     distinct == 1 ? "minimum" : "minima", w.failed);
+  return fmt::format("{} of {} starts end at the best minimum; {} distinct {}, {} failed",
+                     w.at_best, w.starts, distinct, distinct == 1 ? "minimum" : "minima", w.failed);
 }
 
 }  // namespace
 
-Waterfall waterfall(std::span<const double> deviances, double margin) {
+Waterfall waterfall(std::span<const double> deviances) {
   Waterfall w;
-  w.margin = margin;
   w.starts = static_cast<int>(deviances.size());
   std::copy_if(deviances.begin(), deviances.end(), std::back_inserter(w.deviances),
                [](double d) { return std::isfinite(d); });
   std::sort(w.deviances.begin(), w.deviances.end());
   w.failed = w.starts - static_cast<int>(w.deviances.size());
   w.clusters = clusters_of(w.deviances);
-  w.near_best = static_cast<int>(std::ranges::count_if(
-      w.deviances, [&](double d) { return d - w.deviances.front() <= margin; }));
+  w.at_best = static_cast<int>(std::ranges::count(w.clusters, 0));
   w.summary = waterfall_words(w);
   return w;
 }

@@ -81,6 +81,15 @@ std::string to_text(const ShortAnswer& answer, std::size_t most) {
   return text;
 }
 
+std::vector<std::string> counted(std::vector<std::string> lines, std::size_t most,
+                                 const char* what) {
+  if (lines.size() <= most) return lines;
+  const std::size_t left_out = lines.size() - (most - 1);
+  lines.resize(most - 1);
+  lines.push_back(fmt::format("... and {} more {}", left_out, what));
+  return lines;
+}
+
 void end_answer(ShortAnswer& answer, const std::string& folder,
                 const std::vector<std::string>& files, const std::string& next) {
   if (!files.empty()) {

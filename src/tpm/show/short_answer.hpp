@@ -28,6 +28,10 @@ struct ShortAnswer {
 /// At most `most` lines, each ended. A line feed within a part becomes a blank.
 [[nodiscard]] std::string to_text(const ShortAnswer& answer, std::size_t most = kAnswerLines);
 
+/// At most `most` of the lines; the last one counts the others: "... and 3 more recordings".
+[[nodiscard]] std::vector<std::string> counted(std::vector<std::string> lines, std::size_t most,
+                                               const char* what);
+
 /// Adds the lines that end an answer: the files of a folder, where the rest is, what to type next.
 /// @param files may be empty: nothing was written
 void end_answer(ShortAnswer& answer, const std::string& folder,

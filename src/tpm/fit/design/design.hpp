@@ -13,6 +13,7 @@
 #include "tpm/files/keys/file_kind.hpp"
 #include "tpm/fit/likelihood/config.hpp"
 #include "tpm/fit/likelihood/experiment_residuals.hpp"
+#include "tpm/show/short_answer.hpp"
 
 namespace tpm::fit {
 
@@ -223,5 +224,8 @@ struct DesignCheck {
 [[nodiscard]] Json to_json(const DesignResult& result, const DesignCheck* check, std::size_t top);
 [[nodiscard]] std::string to_terminal_text(const DesignResult& result, const DesignCheck* check,
                                            std::size_t top);
+/// The best candidates, what each parameter would be known to, and the test on simulated data.
+[[nodiscard]] ShortAnswer short_answer(const DesignResult& result, const DesignCheck* check,
+                                       std::size_t top);
 
 }  // namespace tpm::fit

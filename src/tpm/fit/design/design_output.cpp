@@ -72,28 +72,39 @@ std::string percent(double relative) {
   return fmt::format("{} %", significant(100.0 * relative, 3));
 }
 
-std::string candidate_rows(const DesignResult& result, std::size_t top) {
+constexpr const char* kAboveCandidates =
+    "expected relative standard errors; ? marks what would not be identified";
+
+std::string candidate_head(const DesignResult& result) {
   std::string text = fmt::format("{:>4}  {:<56}{:>10}", "", "candidate", "score");
   for (const ExpectedParameter& p : result.ranked.front().expected.parameters) {
     text += fmt::format("{:>12}", p.name);
   }
-  text += "\n";
-  for (std::size_t i = 0; i < std::min(top, result.ranked.size()); ++i) {
-    const DesignCandidate& c = result.ranked[i];
-    text += fmt::format("{:>3}.  {:<56}{:>10}", i + 1, experiment_words(c.experiment),
-                        percent(c.expected.score));
-    for (const ExpectedParameter& p : c.expected.parameters) {
-      text += fmt::format("{:>12}", percent(p.relative_error) + (p.identified ? " " : "?"));
-    }
-    text += "\n";
-  }
   return text;
 }
 
-std::string pair_words(const DesignResult& result) {
+std::vector<std::string> candidate_rows(const DesignResult& result, std::size_t top) {
+  std::vector<std::string> rows;
+  for (std::size_t i = 0; i < std::min(top, result.ranked.size()); ++i) {
+    const DesignCandidate& c = result.ranked[i];
+    std::string row = fmt::format("{:>3}.  {:<56}{:>10}", i + 1, experiment_words(c.experiment),
+                                  percent(c.expected.score));
+    for (const ExpectedParameter& p : c.expected.parameters) {
+      row += fmt::format("{:>12}", percent(p.relative_error) + (p.identified ? " " : "?"));
+    }
+    rows.push_back(std::move(row));
+  }
+  return rows;
+}
+
+std::string best_pair(const DesignResult& result) {
   const bool same = result.pair.first == result.pair.second;
-  std::string text = fmt::format("best pair: {}; then {}\n", experiment_words(result.pair.first),
-                                 same ? "the same again" : experiment_words(result.pair.second));
+  return fmt::format("best pair: {}; then {}", experiment_words(result.pair.first),
+                     same ? "the same again" : experiment_words(result.pair.second));
+}
+
+std::string pair_words(const DesignResult& result) {
+  std::string text = best_pair(result) + "\n";
   for (std::size_t i = 0; i < result.pair.expected.parameters.size(); ++i) {
     const ExpectedParameter& p = result.pair.expected.parameters[i];
     text += fmt::format("  {}: {}, {}\n", p.name, interval_words(result.problem.parameter(i), p),
@@ -103,26 +114,29 @@ std::string pair_words(const DesignResult& result) {
 }
 
 std::string cheapest_words(const DesignResult& result) {
-  if (!result.cheapest) return "no single candidate identifies every parameter\n";
+  if (!result.cheapest) return "no single candidate identifies every parameter";
   const DesignCandidate& c = result.ranked[*result.cheapest];
-  return fmt::format("least time that identifies every parameter: {} ({} s in all; place {})\n",
+  return fmt::format("least time that identifies every parameter: {} ({} s in all; place {})",
                      experiment_words(c.experiment), significant(c.experiment.total_s(), 4),
                      *result.cheapest + 1);
 }
 
-std::string check_words(const DesignCheck& check, double level) {
-  std::string text = fmt::format(
-      "\n{} simulated data sets of the best candidate, seed {}, {} could not be fitted\n",
-      check.sets, check.seed, check.failed);
+std::string sets_words(const DesignCheck& check) {
+  return fmt::format(
+      "{} simulated data sets of the best candidate, seed {}, {} could not be fitted", check.sets,
+      check.seed, check.failed);
+}
+
+std::vector<std::string> check_lines(const DesignCheck& check, double level) {
+  std::vector<std::string> lines;
   for (const CheckedParameter& p : check.parameters) {
-    text += fmt::format(
+    lines.push_back(fmt::format(
         "{:<12} spread / prediction {} +- {}, bias {} +- {} standard errors, {} of {} within the "
-        "{:.4g} % interval\n",
+        "{:.4g} % interval",
         p.name, fixed(p.ratio, 3), fixed(p.ratio_error, 3), fixed(p.bias, 2),
-        fixed(p.bias_error, 2), p.covered, check.sets, 100.0 * level);
+        fixed(p.bias_error, 2), p.covered, check.sets, 100.0 * level));
   }
-  for (const Remark& remark : check.remarks) text += fmt::format("warning: {}\n", remark.text);
-  return text;
+  return lines;
 }
 
 }  // namespace
@@ -161,12 +175,45 @@ std::string to_terminal_text(const DesignResult& result, const DesignCheck* chec
   std::string text = fmt::format("{}\n{} candidates; best by the {}\n", problem.config.title,
                                  result.ranked.size(), criterion_words(problem));
   for (const Remark& limit : result.left_out) text += fmt::format("left out: {}\n", limit.text);
-  text += "\nexpected relative standard errors; ? marks what would not be identified\n";
-  text += candidate_rows(result, top) + "\n";
+  text += fmt::format("\n{}\n{}\n", kAboveCandidates, candidate_head(result));
+  for (const std::string& row : candidate_rows(result, top)) text += row + "\n";
+  text += "\n";
   for (const std::string& line : result.summary) text += line + "\n";
-  text += "\n" + cheapest_words(result) + pair_words(result);
-  if (check != nullptr) text += check_words(*check, problem.config.level);
+  text += "\n" + cheapest_words(result) + "\n" + pair_words(result);
+  if (check == nullptr) return text;
+  text += "\n" + sets_words(*check) + "\n";
+  for (const std::string& line : check_lines(*check, problem.config.level)) text += line + "\n";
+  for (const Remark& remark : check->remarks) text += fmt::format("warning: {}\n", remark.text);
   return text;
+}
+
+ShortAnswer short_answer(const DesignResult& result, const DesignCheck* check, std::size_t top) {
+  constexpr std::size_t kMostLeftOut = 2, kMostParameters = 5;
+  const DesignProblem& problem = result.problem;
+  ShortAnswer answer;
+  answer.conclusion = {
+      problem.config.title,
+      fmt::format("best of {} candidates by the {}: {}", result.ranked.size(),
+                  criterion_words(problem), experiment_words(result.ranked.front().experiment))};
+  for (std::string& line : counted(remark_texts(result.left_out), kMostLeftOut, "limits")) {
+    answer.conclusion.push_back("left out: " + line);
+  }
+  answer.head = {kAboveCandidates, candidate_head(result)};
+  answer.rows = candidate_rows(result, top);
+  answer.rest = [count = result.ranked.size()](std::size_t from) {
+    return fmt::format("... {} more candidates", count - from);
+  };
+  answer.limits = counted(result.summary, kMostParameters, "parameters");
+  answer.limits.push_back(cheapest_words(result));
+  answer.limits.push_back(best_pair(result));
+  if (check == nullptr) return answer;
+  answer.limits.push_back(sets_words(*check));
+  for (std::string& line :
+       counted(check_lines(*check, problem.config.level), kMostParameters, "parameters")) {
+    answer.limits.push_back(std::move(line));
+  }
+  answer.warnings = remark_texts(check->remarks);
+  return answer;
 }
 
 }  // namespace tpm::fit

@@ -6,6 +6,7 @@
 #include "tpm/base/remark.hpp"
 #include "tpm/files/json.hpp"
 #include "tpm/fit/online/sequential_fit.hpp"
+#include "tpm/show/short_answer.hpp"
 #include "tpmkit/law_file.hpp"
 
 namespace tpm::fit {
@@ -72,5 +73,7 @@ struct Identification {
 
 [[nodiscard]] Json to_json(const Identification& identification);
 [[nodiscard]] std::string to_terminal_text(const Identification& identification);
+/// The result with its intervals, and where the end of the recording differs.
+[[nodiscard]] ShortAnswer short_answer(const Identification& identification);
 
 }  // namespace tpm::fit

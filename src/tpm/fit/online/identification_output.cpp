@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "tpm/base/sized_unit.hpp"
 #include "tpm/base/text.hpp"
 #include "tpm/fit/online/identification.hpp"
 #include "tpmkit/law_file.hpp"
@@ -86,6 +87,64 @@ Json to_json(const Identification& id) {
   json["history"] = std::move(history);
   json["remarks"] = remarks_json(id.remarks);
   return json;
+}
+
+ShortAnswer short_answer(const Identification& id) {
+  const IdentifiedSample& result = id.result();
+  const IdentifiedSample& last = id.history.back();
+  const auto widest = [](const IdentifiedSample& sample) {
+    const double width = sample.estimate.widest_relative_half_width();
+    return std::isfinite(width) ? fmt::format("+-{} %", significant(100.0 * width, 3))
+                                : std::string("open");
+  };
+  const auto place = [&](const IdentifiedSample& sample) {
+    return fmt::format("{} s after {} samples: {}", significant(sample.time_s, 4),
+                       sample.estimate.samples, law_name(id.laws[sample.law]));
+  };
+  const auto noise = [&](const IdentifiedSample& sample) {
+    return fmt::format(
+        "noise {}, neighbours correlated by {}",
+        sized_text(quantity_dimension(id.laws[sample.law].response), sample.estimate.sigma, 3),
+        significant(sample.estimate.phi, 3));
+  };
+  ShortAnswer answer;
+  answer.conclusion = {fmt::format("{}{}, the widest interval of the material {}",
+                                   id.stopped ? "stopped at " : "at the end, ", place(result),
+                                   widest(result))};
+  answer.conclusion.push_back(noise(result));
+  const auto row = [](const std::string& name, const std::string& estimate,
+                      const std::string& interval, const std::string& unit,
+                      const std::string& width) {
+    return fmt::format("{:<12} {:>11}  {:<24} {:<8} {}", name, estimate, interval, unit, width);
+  };
+  answer.head = {row("parameter", "estimate",
+                     fmt::format("{:.4g} % interval", 100.0 * id.options.level), "unit",
+                     "half width")};
+  for (const SequentialParameter& p : result.estimate.parameters) {
+    // The width, if it is larger, as of a contact near zero.
+    const double width = p.upper - p.lower;
+    const double size = std::isfinite(width) ? std::max(std::abs(p.estimate), width) : p.estimate;
+    const Unit unit = sized_unit(p.parameter.unit, size);
+    const auto shown = [&](double value) {
+      return std::isfinite(value) ? significant(value / unit.to_si, 4) : std::string("open");
+    };
+    const std::string share =
+        std::isfinite(p.relative_half_width())
+            ? fmt::format("+-{} %", significant(100.0 * p.relative_half_width(), 3))
+            : std::string("open");
+    answer.rows.push_back(
+        row(p.parameter.name, shown(p.estimate),
+            p.at_bound ? "-" : fmt::format("{} .. {}", shown(p.lower), shown(p.upper)), unit.symbol,
+            p.at_bound   ? "at a bound"
+            : p.nuisance ? share + " (of the recording)"
+                         : share));
+  }
+  if (id.stopped) {
+    answer.limits.push_back(
+        fmt::format("at the end, {}, {}; {}", place(last), widest(last), noise(last)));
+  }
+  answer.warnings = remark_texts(id.remarks);
+  return answer;
 }
 
 std::string to_terminal_text(const Identification& id) {

@@ -144,6 +144,27 @@ Json to_json(const IdentifiedLoop& loop) {
   return {{"first_law_s", loop.first_s ? Json(*loop.first_s) : Json()}, {"hand_overs", list}};
 }
 
+std::string loop_words(const IdentifiedLoop& loop) {
+  if (!loop.first_s) return "no law was known well enough to enter the loop";
+  std::string text =
+      fmt::format("the first law entered the loop at {} s", significant(*loop.first_s, 4));
+  if (loop.hand_overs.empty()) return text;
+  const auto done = [](const LoopHandOver& h) { return h.done_s.has_value(); };
+  text += fmt::format("; {} of {} hand-overs done", std::ranges::count_if(loop.hand_overs, done),
+                      loop.hand_overs.size());
+  const auto latest = std::find_if(loop.hand_overs.rbegin(), loop.hand_overs.rend(), done);
+  if (latest != loop.hand_overs.rend()) {
+    text +=
+        fmt::format(", the last at {} s to {}, {} N on the hand", significant(*latest->done_s, 4),
+                    latest->to, significant(latest->decision.force_N, 3));
+  }
+  if (!loop.hand_overs.back().done_s) {
+    text += fmt::format("; {} waits: it would store more energy at equal force",
+                        loop.hand_overs.back().to);
+  }
+  return text;
+}
+
 std::string to_terminal_text(const IdentifiedLoop& loop) {
   if (!loop.first_s) return "no law was known well enough to enter the loop\n";
   std::string text =

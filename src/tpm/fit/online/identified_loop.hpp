@@ -40,5 +40,7 @@ struct IdentifiedLoop {
 
 [[nodiscard]] Json to_json(const IdentifiedLoop& loop);
 [[nodiscard]] std::string to_terminal_text(const IdentifiedLoop& loop);
+/// "the first law entered the loop at 5.16 s; 2 of 9 hand-overs done, ...", one line.
+[[nodiscard]] std::string loop_words(const IdentifiedLoop& loop);
 
 }  // namespace tpm::fit

@@ -94,16 +94,6 @@ std::string recording_words(const FitResult& fit, const RecordingFit& r) {
   return text;
 }
 
-/// At most `most` of the lines; the last one counts the others.
-std::vector<std::string> counted(std::vector<std::string> lines, std::size_t most,
-                                 const char* what) {
-  if (lines.size() <= most) return lines;
-  const std::size_t left_out = lines.size() - (most - 1);
-  lines.resize(most - 1);
-  lines.push_back(fmt::format("... and {} more {}", left_out, what));
-  return lines;
-}
-
 std::string starts_words(const FitResult& fit) {
   const std::size_t looked_at = starts_looked_at(fit);
   const bool ranked = looked_at > static_cast<std::size_t>(std::max(fit.starts_run, 0));

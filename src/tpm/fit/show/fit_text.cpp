@@ -59,8 +59,7 @@ std::string minima_table(const FitResult& result) {
     text = fmt::format("{} starts looked at; followed: ", looked_at);
   }
   text += fmt::format(
-      "{} starts, {} failed, {} agree with the best in chi-square and every parameter to 5 "
-      "digits\n",
+      "{} starts, {} failed, {} end at the best minimum: their deviances agree to 5 digits\n",
       result.starts_run, result.starts_failed, result.starts_agreeing);
   for (const DistinctMinimum& m : result.minima) {
     text += fmt::format("  deviance {:<12} {:>3} starts:", significant(m.minimum.deviance, 6),

@@ -10,7 +10,8 @@ namespace tpm::fit {
 /// takes in. What is left out is named in a line of its own.
 class BriefText {
  public:
-  static constexpr std::size_t kMostLines = 25, kWidth = 118;
+  /// Two less than an answer has: the files written and the next command follow.
+  static constexpr std::size_t kMostLines = 23, kWidth = 118;
 
   /// The least important are left out first, of equals the last.
   enum class Rank { always, quantity, remark, context, recording, detail };

@@ -16,6 +16,8 @@ namespace tpm::haptics {
 
 [[nodiscard]] Json check_json(const JitterCheck& check);
 [[nodiscard]] std::string check_text(const JitterCheck& check);
+/// The short answer of a check: the verdicts, then what they rest on. The histogram is left out.
+[[nodiscard]] ShortAnswer short_answer(const JitterCheck& check);
 
 [[nodiscard]] Json run_json(const HilSession& session, const SessionRun& run);
 [[nodiscard]] std::string run_text(const HilSession& session, const SessionRun& run);

@@ -5,6 +5,7 @@
 #include <cmath>
 #include <map>
 #include <optional>
+#include <sstream>
 #include <string_view>
 
 #include "tpm/base/printed_number.hpp"
@@ -185,6 +186,46 @@ std::string said_by_device(const ServoOutcome& o, const std::vector<DeviceFindin
   return text;
 }
 
+/// Machine, device and cycles that were counted.
+std::string measured_text(const JitterCheck& check) {
+  const ServoOutcome& o = check.outcome;
+  std::string text = fmt::format(
+      "{}\n{}\n{}\n{} Hz for {} s: {} cycles, {} late, {} periods missed\n",
+      device_words(check.device), host_line(), o.scheduling, significant(check.rate_Hz, 4),
+      significant(check.duration_s, 4), o.cycles, o.counts.late, o.counts.missed);
+  text += times_text("woke after the deadline", o.woke_late);
+  text += times_text("work of a cycle", o.busy);
+  return text + fmt::format("time guards {}, saturations {}\n", o.counts.time_guards,
+                            o.counts.saturations);
+}
+
+/// Stalls, and the limits of a session.
+std::string limits_text(const JitterCheck& check) {
+  const ServoOutcome& o = check.outcome;
+  return stalls_text(check) +
+         fmt::format(
+             "at most {} consecutive periods missed, {} of 1000 cycles late; watchdog {} ms, a "
+             "cycle may take {} ms; end: {}\n",
+             o.counts.most_consecutive_missed, o.counts.most_late,
+             significant(1e3 * check.watchdog_s, 3), significant(1e3 * check.cycle_timeout_s, 3),
+             to_string(o.cause));
+}
+
+std::string gate_text(const JitterCheck& check) {
+  return check.session ? session_verdict_text(*check.session)
+                       : "session: none was named, so none was asked for its tissue\n";
+}
+
+/// Without empty lines.
+std::vector<std::string> each_line(const std::string& text) {
+  std::vector<std::string> lines;
+  std::istringstream in(text);
+  for (std::string line; std::getline(in, line);) {
+    if (!line.empty()) lines.push_back(line);
+  }
+  return lines;
+}
+
 }  // namespace
 
 Json check_json(const JitterCheck& check) {
@@ -225,28 +266,21 @@ Json check_json(const JitterCheck& check) {
 
 std::string check_text(const JitterCheck& check) {
   const ServoOutcome& o = check.outcome;
-  std::string text = fmt::format(
-      "{}\n{}\n{}\n{} Hz for {} s: {} cycles, {} late, {} periods missed\n",
-      device_words(check.device), host_line(), o.scheduling, significant(check.rate_Hz, 4),
-      significant(check.duration_s, 4), o.cycles, o.counts.late, o.counts.missed);
-  text += times_text("woke after the deadline", o.woke_late);
-  text += times_text("work of a cycle", o.busy);
-  text +=
-      fmt::format("time guards {}, saturations {}\n", o.counts.time_guards, o.counts.saturations);
+  std::string text = measured_text(check);
   if (o.woke_late.count() > 0) text += "woke after the deadline, up to\n";
   for (const auto& [edge, count] : octaves(o.woke_late)) {
     text += fmt::format("  {:>8} us {:>10}\n", us(edge), count);
   }
-  text += stalls_text(check);
-  text += fmt::format(
-      "at most {} consecutive periods missed, {} of 1000 cycles late; watchdog {} ms, a cycle may "
-      "take {} ms; end: {}\n",
-      o.counts.most_consecutive_missed, o.counts.most_late, significant(1e3 * check.watchdog_s, 3),
-      significant(1e3 * check.cycle_timeout_s, 3), to_string(o.cause));
-  text += said_by_device(o, check.findings);
-  text += "timing: " + check.timing + "\n" + check.advice + "\n";
-  return text + (check.session ? session_verdict_text(*check.session)
-                               : "session: none was named, so none was asked for its tissue\n");
+  text += limits_text(check) + said_by_device(o, check.findings);
+  return text + "timing: " + check.timing + "\n" + check.advice + "\n" + gate_text(check);
+}
+
+ShortAnswer short_answer(const JitterCheck& check) {
+  ShortAnswer answer;
+  answer.conclusion = each_line("timing: " + check.timing + "\n" + gate_text(check));
+  answer.limits = each_line(measured_text(check) + limits_text(check) + check.advice);
+  answer.warnings = each_line(said_by_device(check.outcome, check.findings));
+  return answer;
 }
 
 Json run_json(const HilSession& session, const SessionRun& run) {

@@ -57,7 +57,7 @@ std::string spread(const FitParameter& p, double low, double high) {
 }
 
 Table minima_table(const FitResult& fit) {
-  Table table{fmt::format("Where {} starts ended ({} failed). {} agree with the best to 5 digits.",
+  Table table{fmt::format("Where {} starts ended ({} failed). {} end at the best minimum.",
                           fit.starts_run, fit.starts_failed, fit.starts_agreeing),
               {{"deviance", true}, {"starts", true}}};
   for (const ParameterResult& p : fit.parameters) table.columns.push_back({p.parameter.name, true});
