@@ -7,7 +7,7 @@
 #include <functional>
 
 #include "table_reader.hpp"
-#include "tpm/files/import/clock_text.hpp"
+#include "tpm/files/clock_text.hpp"
 #include "tpm/files/import/column_title.hpp"
 #include "tpm/files/import/file_kind.hpp"
 #include "tpm/files/import/header_words.hpp"

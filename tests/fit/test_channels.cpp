@@ -7,10 +7,10 @@
 #include <functional>
 
 #include "tpm/base/random.hpp"
+#include "tpm/fit/recording/placement.hpp"
+#include "tpm/fit/recording/unseen_rises.hpp"
 #include "tpm/fit/select/channel_cause.hpp"
-#include "tpm/fit/select/placement.hpp"
 #include "tpm/fit/select/selection.hpp"
-#include "tpm/fit/select/unseen_rises.hpp"
 
 using namespace tpm;
 using namespace tpm::fit;

@@ -4,7 +4,7 @@
 
 #include "tpm/base/random.hpp"
 #include "tpm/fit/autoregressive.hpp"
-#include "tpm/fit/select/rest_line.hpp"
+#include "tpm/fit/recording/rest_line.hpp"
 
 using namespace tpm;
 using namespace tpm::base;

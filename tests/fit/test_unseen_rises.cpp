@@ -4,8 +4,8 @@
 
 #include "driven_solid.hpp"
 #include "tpm/fit/likelihood/delayed_rise.hpp"
+#include "tpm/fit/recording/unseen_rises.hpp"
 #include "tpm/fit/select/selection.hpp"
-#include "tpm/fit/select/unseen_rises.hpp"
 
 using namespace tpm;
 using namespace tpm::fit;

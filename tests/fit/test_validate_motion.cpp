@@ -8,8 +8,8 @@
 #include <limits>
 
 #include "quiet_recordings.hpp"
+#include "tpm/fit/recording/unseen_rises.hpp"
 #include "tpm/fit/select/clipping.hpp"
-#include "tpm/fit/select/unseen_rises.hpp"
 
 namespace tpm::fit {
 namespace {

@@ -23,7 +23,7 @@
 #include "tpm/fit/fit.hpp"
 #include "tpm/fit/fitted_data.hpp"
 #include "tpm/fit/outliers.hpp"
-#include "tpm/fit/select/placement.hpp"
+#include "tpm/fit/recording/placement.hpp"
 #include "tpm/fit/select/placement_parameters.hpp"
 #include "tpm/fit/select/recording_setup.hpp"
 #include "tpmkit/law_model.hpp"

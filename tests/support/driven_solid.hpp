@@ -5,8 +5,8 @@
 #include <vector>
 
 #include "placed_recordings.hpp"
+#include "tpm/fit/recording/unseen_rises.hpp"
 #include "tpm/fit/select/selection.hpp"
-#include "tpm/fit/select/unseen_rises.hpp"
 
 namespace tpm::test {
 

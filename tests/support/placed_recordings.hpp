@@ -6,7 +6,7 @@
 #include <vector>
 
 #include "tpm/base/random.hpp"
-#include "tpm/fit/select/placement.hpp"
+#include "tpm/fit/recording/placement.hpp"
 #include "tpmkit/law_model.hpp"
 
 namespace tpm::test {

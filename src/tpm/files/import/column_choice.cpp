@@ -10,7 +10,7 @@
 #include "tpm/base/lists.hpp"
 #include "tpm/base/namespaces.hpp"
 #include "tpm/base/nearest_word.hpp"
-#include "tpm/files/import/clock_text.hpp"
+#include "tpm/files/clock_text.hpp"
 #include "tpmkit/error.hpp"
 
 namespace tpm::files {

@@ -11,8 +11,8 @@
 
 #include "tpm/base/namespaces.hpp"
 #include "tpm/base/text.hpp"
+#include "tpm/files/clock_text.hpp"
 #include "tpm/files/import/cantilever.hpp"
-#include "tpm/files/import/clock_text.hpp"
 #include "tpm/files/import/column_choice.hpp"
 #include "tpm/files/import/contact.hpp"
 #include "tpm/files/import/machine_columns.hpp"

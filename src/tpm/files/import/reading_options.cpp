@@ -13,7 +13,7 @@
 #include "tpm/base/namespaces.hpp"
 #include "tpm/base/nearest_word.hpp"
 #include "tpm/base/text.hpp"
-#include "tpm/files/import/clock_text.hpp"
+#include "tpm/files/clock_text.hpp"
 #include "tpm/files/keys/more_types.hpp"
 #include "tpmkit/error.hpp"
 #include "tpmkit/units.hpp"

@@ -4,7 +4,7 @@
 
 #include <algorithm>
 
-#include "tpm/files/import/clock_text.hpp"
+#include "tpm/files/clock_text.hpp"
 #include "tpm/files/number_style.hpp"
 
 namespace tpm::files {

@@ -20,7 +20,7 @@ bool is_pressed(const Recording& recording) noexcept {
          recording.response_quantity == Quantity::indentation_depth;
 }
 
-double mean_of(std::span<const double> values) {
+double mean_reading(std::span<const double> values) {
   return std::accumulate(values.begin(), values.end(), 0.0) / static_cast<double>(values.size());
 }
 
@@ -43,7 +43,7 @@ Recording with_imposed_load(Recording recording) {
   recording.response_sd.clear();
   if (!is_pressed(recording)) return recording;
   const auto rest = std::span(recording.drive).first(samples_before_load(recording));
-  if (!rest.empty()) std::ranges::fill(rest, mean_of(rest));
+  if (!rest.empty()) std::ranges::fill(rest, mean_reading(rest));
   return recording;
 }
 
@@ -55,7 +55,7 @@ std::size_t samples_before_load(const Recording& recording) {
   if (phases.size() < 2 || phases.front().kind != PhaseKind::hold) return 0;
   const std::size_t count = phases.front().last + 1;
   const double most = *std::ranges::max_element(recording.drive);
-  const double level = mean_of(std::span(recording.drive).first(count));
+  const double level = mean_reading(std::span(recording.drive).first(count));
   return count < kFewest || std::abs(level) > kNoPreload * most ? 0 : count;
 }
 

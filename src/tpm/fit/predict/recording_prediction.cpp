@@ -12,8 +12,8 @@
 #include "tpm/fit/likelihood/delayed_rise.hpp"
 #include "tpm/fit/likelihood/load_imposed.hpp"
 #include "tpm/fit/predict/prediction_parts.hpp"
+#include "tpm/fit/recording/placement.hpp"
 #include "tpm/fit/select/clipping.hpp"
-#include "tpm/fit/select/placement.hpp"
 #include "tpmkit/error.hpp"
 #include "tpmkit/law_model.hpp"
 

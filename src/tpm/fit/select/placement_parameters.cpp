@@ -8,8 +8,8 @@
 #include "tpm/base/quantity_text.hpp"
 #include "tpm/base/text.hpp"
 #include "tpm/fit/likelihood/load_imposed.hpp"
-#include "tpm/fit/select/placement.hpp"
-#include "tpm/fit/select/unseen_rises.hpp"
+#include "tpm/fit/recording/placement.hpp"
+#include "tpm/fit/recording/unseen_rises.hpp"
 #include "tpm/fit/verdict.hpp"
 #include "tpmkit/error.hpp"
 

@@ -13,13 +13,13 @@
 #include "tpm/files/import/reading_options.hpp"
 #include "tpm/fit/likelihood/fit_words.hpp"
 #include "tpm/fit/likelihood/load_imposed.hpp"
+#include "tpm/fit/recording/kept_load.hpp"
+#include "tpm/fit/recording/loading_sense.hpp"
+#include "tpm/fit/recording/placement.hpp"
+#include "tpm/fit/recording/start_up.hpp"
 #include "tpm/fit/select/clipping.hpp"
 #include "tpm/fit/select/imposed_channel.hpp"
-#include "tpm/fit/select/kept_load.hpp"
-#include "tpm/fit/select/loading_sense.hpp"
-#include "tpm/fit/select/placement.hpp"
 #include "tpm/fit/select/placement_parameters.hpp"
-#include "tpm/fit/select/start_up.hpp"
 #include "tpmkit/error.hpp"
 #include "tpmkit/law_model.hpp"
 
@@ -230,13 +230,6 @@ void require_alike(std::span<const PreparedRecording> recordings) {
 }
 
 }  // namespace
-
-double median_step(std::span<const double> time_s) {
-  std::vector<double> steps;
-  steps.reserve(time_s.size());
-  for (std::size_t i = 1; i < time_s.size(); ++i) steps.push_back(time_s[i] - time_s[i - 1]);
-  return median(std::move(steps));
-}
 
 FitParameter readable(FitParameter fit) {
   constexpr int kDigits = 4;

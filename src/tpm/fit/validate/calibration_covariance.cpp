@@ -6,8 +6,8 @@
 
 #include "tpm/base/dense_algebra.hpp"
 #include "tpm/fit/autoregressive.hpp"
-#include "tpm/fit/select/placement.hpp"
-#include "tpm/fit/select/unseen_rises.hpp"
+#include "tpm/fit/recording/placement.hpp"
+#include "tpm/fit/recording/unseen_rises.hpp"
 #include "tpm/fit/validate/measured_placement_weights.hpp"
 
 namespace tpm::fit {

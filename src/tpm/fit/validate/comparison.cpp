@@ -24,8 +24,7 @@ namespace tpm::fit {
 namespace {
 
 constexpr double kAllDegrees = std::numeric_limits<double>::infinity();
-// Of the value: the closed forms err by less (LawModel).
-constexpr double kNumericalError = 1e-9;
+constexpr double kNumericalError = 1e-9;  // of the value: the closed forms err by less (LawModel)
 constexpr const char* kFilling = "the place of the spheres";
 
 RecordingComparison begun(const PreparedRecording& recording, const ComparisonOptions& options) {
@@ -483,8 +482,7 @@ class Comparer {
   LawAlong::At at_;
   Eigen::VectorXd measured_, depth_scale_, time_scale_, time_shift_;
   std::vector<Eigen::VectorXd> weights_, by_rise_;
-  Eigen::Array<bool, Eigen::Dynamic, 1>
-      clipped_;  ///< whether a reading stands at a limit of the force cell
+  Eigen::Array<bool, Eigen::Dynamic, 1> clipped_;  ///< readings at a limit of the force cell
   std::vector<LawAlong::Refinement> refinements_;
   std::vector<Eigen::VectorXd> by_filling_;  ///< of the organ, then of other fillings
   double claimed_limit_ = 0.0;

@@ -8,7 +8,7 @@
 #include "tpm/base/remark.hpp"
 #include "tpm/files/instrument.hpp"
 #include "tpm/fit/predict/other_fillings.hpp"
-#include "tpm/fit/select/unseen_rises.hpp"
+#include "tpm/fit/recording/unseen_rises.hpp"
 #include "tpm/fit/validate/joint_test.hpp"
 #include "tpm/fit/validate/placement_of_recording.hpp"
 #include "tpm/fit/validate/requirement.hpp"

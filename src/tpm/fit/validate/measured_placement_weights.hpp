@@ -2,7 +2,7 @@
 #include <Eigen/Core>
 #include <optional>
 
-#include "tpm/fit/select/placement.hpp"
+#include "tpm/fit/recording/placement.hpp"
 
 namespace tpm::fit {
 

@@ -10,7 +10,7 @@
 #include "tpm/base/enum_names.hpp"
 #include "tpm/base/quantity_text.hpp"
 #include "tpm/base/text.hpp"
-#include "tpm/fit/select/placement.hpp"
+#include "tpm/fit/recording/placement.hpp"
 #include "tpmkit/error.hpp"
 
 namespace tpm::fit {

@@ -1,4 +1,4 @@
-#include "tpm/fit/select/start_up.hpp"
+#include "tpm/fit/recording/start_up.hpp"
 
 #include <fmt/format.h>
 

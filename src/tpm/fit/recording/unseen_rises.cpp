@@ -1,4 +1,4 @@
-#include "tpm/fit/select/unseen_rises.hpp"
+#include "tpm/fit/recording/unseen_rises.hpp"
 
 #include <fmt/format.h>
 

@@ -1,4 +1,4 @@
-#include "tpm/fit/select/rest_line.hpp"
+#include "tpm/fit/recording/rest_line.hpp"
 
 #include <Eigen/Cholesky>
 #include <algorithm>
@@ -7,7 +7,7 @@
 #include "tpm/base/distributions.hpp"
 #include "tpm/base/namespaces.hpp"
 #include "tpm/fit/autoregressive.hpp"
-#include "tpm/fit/select/recording_setup.hpp"
+#include "tpm/fit/recording/prepared_recording.hpp"
 
 namespace tpm::fit {
 namespace {

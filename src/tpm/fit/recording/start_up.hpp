@@ -1,5 +1,5 @@
 #pragma once
-#include "tpm/fit/select/recording_setup.hpp"
+#include "tpm/fit/recording/prepared_recording.hpp"
 
 namespace tpm::fit {
 

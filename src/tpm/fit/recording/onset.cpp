@@ -1,4 +1,4 @@
-// Declared in tpm/fit/select/placement.hpp.
+// Declared in tpm/fit/recording/placement.hpp.
 // The onset of contact.
 #include <Eigen/Cholesky>
 #include <algorithm>
@@ -8,7 +8,7 @@
 #include <span>
 #include <vector>
 
-#include "tpm/fit/select/placement.hpp"
+#include "tpm/fit/recording/placement.hpp"
 #include "tpm/fit/spikes_at_rest.hpp"
 
 namespace tpm::fit {

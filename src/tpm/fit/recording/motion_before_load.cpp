@@ -1,4 +1,4 @@
-#include "tpm/fit/select/motion_before_load.hpp"
+#include "tpm/fit/recording/motion_before_load.hpp"
 
 #include <fmt/format.h>
 

@@ -1,11 +1,11 @@
-#include "tpm/fit/select/carried_noise.hpp"
+#include "tpm/fit/recording/carried_noise.hpp"
 
 #include <algorithm>
 #include <cmath>
 #include <span>
 #include <vector>
 
-#include "tpm/fit/select/motion_before_load.hpp"
+#include "tpm/fit/recording/motion_before_load.hpp"
 
 namespace tpm::fit {
 namespace {

@@ -1,4 +1,4 @@
-#include "tpm/fit/select/placement.hpp"
+#include "tpm/fit/recording/placement.hpp"
 
 #include <Eigen/QR>
 #include <algorithm>
@@ -9,8 +9,8 @@
 #include "tpm/fit/adequacy.hpp"
 #include "tpm/fit/autoregressive.hpp"
 #include "tpm/fit/likelihood/load_imposed.hpp"
-#include "tpm/fit/select/pull_after_withdrawal.hpp"
-#include "tpm/fit/select/rest_line.hpp"
+#include "tpm/fit/recording/pull_after_withdrawal.hpp"
+#include "tpm/fit/recording/rest_line.hpp"
 #include "tpm/fit/spikes_at_rest.hpp"
 
 namespace tpm::fit {

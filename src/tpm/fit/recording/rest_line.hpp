@@ -4,7 +4,7 @@
 #include <span>
 #include <vector>
 
-#include "tpm/fit/select/placement.hpp"
+#include "tpm/fit/recording/placement.hpp"
 
 namespace tpm::fit {
 

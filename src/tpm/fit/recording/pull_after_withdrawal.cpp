@@ -1,4 +1,4 @@
-#include "tpm/fit/select/pull_after_withdrawal.hpp"
+#include "tpm/fit/recording/pull_after_withdrawal.hpp"
 
 #include <Eigen/Cholesky>
 #include <cmath>
@@ -6,7 +6,7 @@
 
 #include "tpm/base/median.hpp"
 #include "tpm/fit/autoregressive.hpp"
-#include "tpm/fit/select/recording_setup.hpp"
+#include "tpm/fit/recording/prepared_recording.hpp"
 
 namespace tpm::fit {
 namespace {

@@ -1,4 +1,4 @@
-#include "tpm/files/import/clock_text.hpp"
+#include "tpm/files/clock_text.hpp"
 
 #include <algorithm>
 #include <charconv>

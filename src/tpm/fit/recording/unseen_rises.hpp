@@ -2,7 +2,7 @@
 #include <string>
 #include <vector>
 
-#include "tpm/fit/select/recording_setup.hpp"
+#include "tpm/fit/recording/prepared_recording.hpp"
 #include "tpmkit/law_uncertainty.hpp"
 
 namespace tpm::fit {

@@ -1,4 +1,4 @@
-#include "tpm/fit/select/kept_load.hpp"
+#include "tpm/fit/recording/kept_load.hpp"
 
 #include <fmt/format.h>
 

@@ -7,7 +7,7 @@
 #include <vector>
 
 #include "tpm/fit/likelihood/config.hpp"
-#include "tpm/fit/select/recording_setup.hpp"
+#include "tpm/fit/recording/prepared_recording.hpp"
 
 namespace tpm::fit {
 
