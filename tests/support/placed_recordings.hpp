@@ -7,6 +7,7 @@
 
 #include "tpm/base/random.hpp"
 #include "tpm/fit/recording/placement.hpp"
+#include "tpm/fit/select/recording_setup.hpp"
 #include "tpmkit/law_model.hpp"
 
 namespace tpm::test {
