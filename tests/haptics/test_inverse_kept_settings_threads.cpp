@@ -62,7 +62,7 @@ TEST_CASE("A setting that tpm hil serve does not have stays, with one line for e
     const std::lock_guard<std::mutex> lock(mutex);
     lines.clear();
   }
-  const std::vector<std::string> before = now().lines();
+  const std::vector<Remark> before = now().lines();
   struct Case {
     const char* asked;
     const char* said;

@@ -63,10 +63,10 @@ TEST_CASE("An inventory of the public description is read") {
   CHECK(d.state.has_grip);
   CHECK(d.state.buttons == 0b101U);
   CHECK(d.state.grip.x() == 1.0);
-  CHECK_THAT(d.settings.lines().back(), Contains("torque scaling on"));
+  CHECK_THAT(d.settings.lines().back().text, Contains("torque scaling on"));
   std::string silent = kInventory;
   silent.replace(silent.find("torque_scaling"), 14, "unnamed_things");
-  CHECK_THAT(parse_inventory(silent).devices.at(0).settings.lines().back(),
+  CHECK_THAT(parse_inventory(silent).devices.at(0).settings.lines().back().text,
              Contains("torque scaling not named"));
 }
 
@@ -197,11 +197,11 @@ TEST_CASE("What an inventory leaves out, or says to be null, is as if it had no 
         .settings;
   };
   const InverseSettings bare = settings("");
-  const std::vector<std::string> said = bare.lines();
-  CHECK_THAT(said.at(0), Contains("force gate not named"));
-  CHECK_THAT(said.at(1), Contains("damping not named"));
-  CHECK_THAT(said.at(2), Contains("preset '', basis XYZ"));
-  CHECK_THAT(said.at(4), Contains("gravity compensation not named; torque scaling not named"));
+  const std::vector<Remark> said = bare.lines();
+  CHECK_THAT(said.at(0).text, Contains("force gate not named"));
+  CHECK_THAT(said.at(1).text, Contains("damping not named"));
+  CHECK_THAT(said.at(2).text, Contains("preset '', basis XYZ"));
+  CHECK_THAT(said.at(4).text, Contains("gravity compensation not named; torque scaling not named"));
   CHECK(bare.true_to_scale());
   CHECK(bare.carried() == 0.0);
   CHECK(settings(R"(, "preset": null, "mount": null, "filters": null, "torque_scaling": null)")
@@ -225,7 +225,7 @@ TEST_CASE("What an inventory leaves out, or says to be null, is as if it had no 
   CHECK(
       settings(R"(, "gravity_compensation": {"enabled": false, "scaling_factor": 1})").carried() ==
       0.0);
-  CHECK_THAT(settings(R"(, "torque_scaling": {"enabled": false})").lines().back(),
+  CHECK_THAT(settings(R"(, "torque_scaling": {"enabled": false})").lines().back().text,
              Contains("torque scaling off"));
 }
 
