@@ -2,6 +2,7 @@
 #include <algorithm>
 #include <chrono>
 
+#include "answer.hpp"
 #include "design_options.hpp"
 #include "tpm/fit/coverage.hpp"
 #include "tpm/show/json_table_csv.hpp"
@@ -24,11 +25,14 @@ int check_intervals(const DesignOptions& options, const Session& session) {
       check_coverage(config, static_cast<int>(parse_whole_number(sets, "--repetitions", 1)),
                      design_seed(options.seed));
   const Json json = tpm::fit::to_json(result);
-  deliver(session.json() ? to_text(json) : to_terminal_text(result), options.output);
-  deliver_csv(json_table_csv(Json::array({json}), "/parameters"), csv);
   constexpr double kSuspicious = 0.001;
-  return exit_code(std::ranges::none_of(
-      result.parameters, [](const ParameterCoverage& p) { return p.p_value < kSuspicious; }));
+  const bool covered = std::ranges::none_of(
+      result.parameters, [](const ParameterCoverage& p) { return p.p_value < kSuspicious; });
+  deliver(session.json() ? answer_text(session, json, {{"coverage_as_stated", covered}})
+                         : to_terminal_text(result),
+          options.output);
+  deliver_csv(json_table_csv(Json::array({json}), "/parameters"), csv);
+  return exit_code(covered);
 }
 
 }  // namespace tpm::app

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 
+#include "answer.hpp"
 #include "design_options.hpp"
 #include "recording_options.hpp"
 #include "tpm/fit/design/recovery.hpp"
@@ -46,10 +47,13 @@ int check_choice_of_law(const DesignOptions& options, const Session& session) {
   for (const LawSpec& law : chosen_laws(options.laws, options.family)) {
     results.push_back(recover(law, visible_parameters(law, order), study));
   }
-  deliver(session.json() ? to_text(results_json(results)) : to_terminal_text(results),
+  const Json json = results_json(results);
+  const bool returned = std::ranges::all_of(results, &RecoveryResult::fulfilled);
+  deliver(session.json() ? answer_text(session, json, {{"laws_returned", returned}})
+                         : to_terminal_text(results),
           options.output);
-  deliver_csv(json_table_csv(results_json(results).at("laws"), "/choices"), csv);
-  return exit_code(std::ranges::all_of(results, &RecoveryResult::fulfilled));
+  deliver_csv(json_table_csv(json.at("laws"), "/choices"), csv);
+  return exit_code(returned);
 }
 
 }  // namespace tpm::app

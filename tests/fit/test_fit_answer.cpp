@@ -193,6 +193,11 @@ TEST_CASE("screen, figure and JSON count the same starts at the best minimum", "
              Contains(fmt::format("{} of {} starts end at the best minimum", at_best,
                                   fit.waterfall.starts)));
   CHECK(to_json(fit).at("starts").at("agreeing_to_5_digits") == at_best);
+  // Rounds that go on from the minima count the starts that had led there.
+  int listed = 0;
+  for (const DistinctMinimum& m : fit.minima) listed += m.starts;
+  CHECK(listed == fit.starts_run - fit.starts_failed);
+  CHECK(to_json(fit).at("minima").at(0).at("starts") >= at_best);
 }
 
 TEST_CASE("ends of starts that agree are drawn on the axis on which they count as one") {

@@ -193,6 +193,22 @@ TEST_CASE("a recording that was fitted keeps its contact and offset, another fin
   CHECK(other.standard_error.back() > 0.5 * same.standard_error.back());
 }
 
+TEST_CASE("contact, offset and the table of an answer have units of their size") {
+  LawPrediction p =
+      predict_law(spring_law(), ramp_and_hold(4e-3, 1e-3, 5.0), std::vector{0.0, 4.0, 9.0}, {});
+  CHECK_THAT(to_terminal_text(p), Contains("contact 0 mm, offset 0 N (") && Contains("mean N"));
+  p.contact = -2.738e-7;
+  p.offset = -1.952e-5;
+  CHECK_THAT(to_terminal_text(p), Contains("contact -273.8 nm, offset -19.52 uN ("));
+  for (auto* values : {&p.response, &p.mean_lower, &p.mean_upper}) {
+    for (double& value : *values) value *= 1e-6;
+  }
+  const std::string text = to_terminal_text(p);
+  INFO(text);
+  CHECK_THAT(text, Contains("mean nN"));
+  CHECK_THAT(text, !Contains("e-0"));
+}
+
 TEST_CASE("what goes beyond the fitted data is said") {
   const LawFile law = spring_law();
   const LawPrediction deep =

@@ -36,6 +36,8 @@ identify recording.csv --laws linear-1 --no-loop
 laws
 laws power-2
 design CONFIGS/design_liver.json --repetitions 0
+design CONFIGS/coverage_absolute.json --repetitions 2
+design --laws linear --repetitions 1
 network build --spheres 60 -o net.h5
 network check CONFIGS/liver_inner_fixed_scene.json
 material fitted/law.json CONFIGS/liver_scene.json recording.csv --folder on_liver

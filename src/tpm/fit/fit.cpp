@@ -61,20 +61,24 @@ Approach approach_to(const ExperimentResiduals& function,
 }
 
 /// Where a search begins: at minima that are near, or anywhere if there are none.
-using NearMinima = std::vector<std::vector<double>>;
+struct NearMinima {
+  std::vector<std::vector<double>> natural;
+  std::vector<int> starts;  ///< that had led to each
+};
 
 /// Where no start can be evaluated, the reason is said if it lies in the recording.
 FitResult search(const ExperimentResiduals& function, const std::vector<FitParameter>& parameters,
                  const Threshold& threshold, bool profiles, const NearMinima& near) {
   try {
-    const Approach approach =
-        near.empty() ? approach_to(function, parameters) : Approach{near, StartKind::solved};
-    return fit_residuals(function, parameters, approach.starts, threshold, profiles, approach.kind,
-                         [&](std::span<const double> best, Threshold& at) {
-                           at.noise = noise_of_estimates(function, parameters, best);
-                           at.inflation =
-                               at.noise ? at.noise->inflation : inflation_at(function, best);
-                         });
+    const Approach approach = near.natural.empty() ? approach_to(function, parameters)
+                                                   : Approach{near.natural, StartKind::solved};
+    return fit_residuals(
+        function, parameters, approach.starts, threshold, profiles, approach.kind,
+        [&](std::span<const double> best, Threshold& at) {
+          at.noise = noise_of_estimates(function, parameters, best);
+          at.inflation = at.noise ? at.noise->inflation : inflation_at(function, best);
+        },
+        near.starts);
   } catch (const Error& error) {
     if (error.code() != ExitCode::numerical) throw;
     if (const auto reason = unpredicted_window(function, start_values(parameters))) throw *reason;
@@ -104,8 +108,9 @@ FitResult widened_search(const ExperimentResiduals& function, std::vector<FitPar
 NearMinima minima_of(const FitResult& result) {
   NearMinima minima;
   for (const DistinctMinimum& m : result.minima) {
-    if (minima.size() == kMostSurrogateMinima) break;
-    minima.push_back(m.minimum.natural);
+    if (minima.natural.size() == kMostSurrogateMinima) break;
+    minima.natural.push_back(m.minimum.natural);
+    minima.starts.push_back(m.starts);
   }
   return minima;
 }
@@ -201,7 +206,7 @@ FitResult fit_searched(const ExperimentResiduals& function, ExperimentResiduals*
   }
   if (confirmation.deeper) {
     result = widened_search(function, parameters, threshold, config.profiles,
-                            {*confirmation.deeper, result.best.natural});
+                            {{*confirmation.deeper, result.best.natural}, {1, 1}});
     confirmation.found = 1;
   }
   threshold = threshold_of_search(threshold, result);

@@ -165,12 +165,15 @@ using NoiseRule = std::function<void(std::span<const double>, Threshold&)>;
 /// The same for any residuals: the part of run_fit that does not know what is fitted. Fills best,
 /// parameters, covariance, starts and minima.
 /// @param noise asked at the minimum, and again where a profile met a deeper one
+/// @param led_there of each start that is a minimum found before: how many starts had led there,
+///                  which DistinctMinimum::starts counts; empty for 1 each
 [[nodiscard]] FitResult fit_residuals(const ResidualFunction& function,
                                       std::vector<FitParameter> parameters,
                                       const std::vector<std::vector<double>>& starts,
                                       Threshold threshold, bool profiles,
                                       StartKind kind = StartKind::anywhere,
-                                      const NoiseRule& noise = {});
+                                      const NoiseRule& noise = {},
+                                      std::span<const int> led_there = {});
 
 /// Limits of the free parameters from the covariance alone, open at the bounds; none without one of
 /// full rank.

@@ -28,17 +28,17 @@ struct MultiStart {
   std::vector<double> end_deviances;  ///< of every start; NaN where it failed
 };
 
-void add_to_cluster(std::vector<DistinctMinimum>& minima, const Minimum& m) {
+void add_to_cluster(std::vector<DistinctMinimum>& minima, const Minimum& m, int starts) {
   for (DistinctMinimum& cluster : minima) {
     if (!same_deviance(m.deviance, cluster.minimum.deviance)) continue;
-    ++cluster.starts;
+    cluster.starts += starts;
     for (std::size_t i = 0; i < m.natural.size(); ++i) {
       cluster.low[i] = std::min(cluster.low[i], m.natural[i]);
       cluster.high[i] = std::max(cluster.high[i], m.natural[i]);
     }
     return;
   }
-  minima.push_back({m, 1, m.natural, m.natural});
+  minima.push_back({m, starts, m.natural, m.natural});
 }
 
 /// Both first steps are tried; the deeper end counts.
@@ -52,9 +52,10 @@ Minimum minimise_both_ways(const ResidualFunction& function,
 }
 
 MultiStart run_starts(const ResidualFunction& function, std::span<const FitParameter> parameters,
-                      const std::vector<std::vector<double>>& starts, StartKind kind) {
+                      const std::vector<std::vector<double>>& starts, StartKind kind,
+                      std::span<const int> led_there) {
   MultiStart result;
-  std::vector<Minimum> ends;
+  std::vector<std::pair<Minimum, int>> ends;  // with the number of starts that it stands for
   Progress progress("fitting from several starts", starts.size());
   for (const auto& start : starts) {
     Minimum m = kind == StartKind::solved ? minimise_near(function, parameters, start)
@@ -64,7 +65,8 @@ MultiStart run_starts(const ResidualFunction& function, std::span<const FitParam
     result.end_deviances.push_back(m.usable ? m.deviance
                                             : std::numeric_limits<double>::quiet_NaN());
     if (m.usable) {
-      ends.push_back(std::move(m));
+      const std::size_t start = result.end_deviances.size() - 1;
+      ends.emplace_back(std::move(m), led_there.empty() ? 1 : led_there[start]);
     } else {
       ++result.failed;
     }
@@ -75,8 +77,8 @@ MultiStart run_starts(const ResidualFunction& function, std::span<const FitParam
         ExitCode::numerical, "fit",
         fmt::format("none of {} starts ended in a point that can be evaluated", starts.size()));
   }
-  std::ranges::stable_sort(ends, {}, &Minimum::deviance);
-  for (const Minimum& m : ends) add_to_cluster(result.minima, m);
+  std::ranges::stable_sort(ends, {}, [](const auto& end) { return end.first.deviance; });
+  for (const auto& [m, count] : ends) add_to_cluster(result.minima, m, count);
   return result;
 }
 
@@ -205,10 +207,11 @@ void linear_intervals(FitResult& result, std::span<const FitParameter> parameter
 
 FitResult fit_residuals(const ResidualFunction& function, std::vector<FitParameter> parameters,
                         const std::vector<std::vector<double>>& starts, Threshold threshold,
-                        bool profiles, StartKind kind, const NoiseRule& noise) {
+                        bool profiles, StartKind kind, const NoiseRule& noise,
+                        std::span<const int> led_there) {
   threshold.parameter_count = static_cast<int>(parameters.size());
   FitResult result;
-  MultiStart multi = run_starts(function, parameters, starts, kind);
+  MultiStart multi = run_starts(function, parameters, starts, kind, led_there);
   result.starts_run = multi.run;
   result.starts_failed = multi.failed;
   result.waterfall = waterfall(multi.end_deviances);

@@ -3,10 +3,20 @@
 #include <fmt/format.h>
 #include <unistd.h>
 
+#include <atomic>
 #include <cstdio>
 #include <utility>
 
 namespace tpm::work {
+namespace {
+
+std::atomic<bool> line_is_taken = false;  // by the Progress that is shown
+
+bool takes_line() {
+  return isatty(STDERR_FILENO) != 0 && !line_is_taken.exchange(true);
+}
+
+}  // namespace
 
 Progress::Progress(std::string what, std::size_t total, std::size_t already)
     : what_(std::move(what)),
@@ -14,12 +24,14 @@ Progress::Progress(std::string what, std::size_t total, std::size_t already)
       done_(already),
       already_(already),
       start_(std::chrono::steady_clock::now()),
-      on_terminal_(isatty(STDERR_FILENO) != 0) {
+      shown_(takes_line()) {
   draw();
 }
 
 Progress::~Progress() {
-  if (on_terminal_) std::fputs("\r\033[K", stderr);
+  if (!shown_) return;
+  std::fputs("\r\033[K", stderr);
+  line_is_taken = false;
 }
 
 void Progress::advance(std::size_t steps) {
@@ -28,7 +40,7 @@ void Progress::advance(std::size_t steps) {
 }
 
 void Progress::draw() const {
-  if (!on_terminal_) return;
+  if (!shown_) return;
   if (total_ > 0) {
     fmt::print(stderr, "\r\033[K{}: {} of {}{}", what_, done_, total_, time_left());
   } else {

@@ -7,7 +7,8 @@ namespace tpm::work {
 
 /// One line of progress on standard error, rewritten in place, with an estimate of the time that is
 /// left once some seconds have passed; silent unless standard error is a
-/// terminal, so that pipes and logs stay clean.
+/// terminal, so that pipes and logs stay clean. While one is shown, any other is silent: the fits
+/// of a study do not overwrite the line of the study.
 class Progress {
  public:
   /// @param what a short phrase ("profiling", "coverage")
@@ -20,7 +21,7 @@ class Progress {
 
   void advance(std::size_t steps = 1);
   /// False: nobody sees it, and what only serves it can be left out.
-  [[nodiscard]] bool is_shown() const { return on_terminal_; }
+  [[nodiscard]] bool is_shown() const { return shown_; }
 
  private:
   void draw() const;
@@ -30,7 +31,7 @@ class Progress {
   std::size_t done_ = 0;
   std::size_t already_ = 0;
   std::chrono::steady_clock::time_point start_;
-  bool on_terminal_;
+  bool shown_;
 };
 
 }  // namespace tpm::work

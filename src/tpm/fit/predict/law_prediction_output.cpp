@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "tpm/base/sized_unit.hpp"
 #include "tpm/base/text.hpp"
 #include "tpm/files/blocks/law_json.hpp"
 #include "tpm/files/delimited.hpp"
@@ -55,15 +56,22 @@ std::string comparison_words(const char* what, const PredictionComparison& c, do
 }
 
 std::string placement_words(const LawPrediction& p) {
-  const Unit drive = shown_unit(quantity_dimension(p.spec.drive));
-  const Unit response = shown_unit(quantity_dimension(p.spec.response));
   const char* whose = p.placement == Placement::surface ? "none: depths count from the surface"
                       : p.placement == Placement::fitted
                           ? "of the fit"
                           : "found for this recording, material fixed";
-  return fmt::format("contact {} {}, offset {} {} ({})\n", significant(p.contact / drive.to_si, 4),
-                     drive.symbol, significant(p.offset / response.to_si, 4), response.symbol,
-                     whose);
+  return fmt::format("contact {}, offset {} ({})\n",
+                     sized_text(quantity_dimension(p.spec.drive), p.contact, 4),
+                     sized_text(quantity_dimension(p.spec.response), p.offset, 4), whose);
+}
+
+/// Of a table of the answer: the unit in which its largest value is read most easily.
+Unit table_unit(const LawPrediction& p) {
+  double largest = 0.0;
+  for (const double value : p.response) {
+    if (std::isfinite(value)) largest = std::max(largest, std::abs(value));
+  }
+  return sized_unit(shown_unit(p.response_dimension()), largest);
 }
 
 }  // namespace
@@ -132,7 +140,7 @@ std::string to_csv(const LawPrediction& p) {
 
 std::string to_terminal_text(const LawPrediction& p) {
   constexpr std::size_t kRows = 12;
-  const Unit unit = shown_unit(p.response_dimension());
+  const Unit unit = table_unit(p);
   std::string text = fmt::format(
       "{}: {}\n{}{} % bands, {}\n\n", p.subject(), law_words(p.spec), placement_words(p),
       significant(100.0 * p.level, 4),
