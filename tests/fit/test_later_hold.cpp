@@ -2,9 +2,14 @@
 #include <algorithm>
 #include <catch2/catch.hpp>
 #include <cmath>
+#include <fstream>
 
+#include "support/fitted_parameter.hpp"
 #include "support/remarks.hpp"
+#include "support/temp_folder.hpp"
 #include "tpm/base/random.hpp"
+#include "tpm/files/import/recording_file.hpp"
+#include "tpm/fit/select/fit_adequacy.hpp"
 #include "tpm/fit/select/selection.hpp"
 #include "tpmkit/law_model.hpp"
 
@@ -14,9 +19,9 @@ using Catch::Contains;
 
 namespace {
 
-/// Two cycles to 4 mm, a rest, and a ramp that is held: linear-1 of 100 N/m, 40 N/m and 0.7 s. The
-/// force never pulls.
-Recording conditioned(bool held) {
+/// Two cycles to 4 mm, a rest from 5 to 10 s, and a ramp that is held: linear-1 of 100 N/m, 40 N/m
+/// and tau1. The force never pulls.
+Recording conditioned(bool held, double tau_s = 0.7) {
   Recording r;
   const auto cycle = [](double t) { return std::max(0.0, 4e-3 * (1.0 - std::abs(t - 1.0))); };
   for (int i = 0; 0.05 * i < (held ? 30.0 : 9.0); ++i) {
@@ -28,21 +33,42 @@ Recording conditioned(bool held) {
   const Protocol history = measured_history(Drive::displacement, r.time_s, r.drive);
   const Eigen::VectorXd f =
       model
-          .respond(history, r.time_s, std::vector<double>{100.0, 40.0, 0.7, 0.0, 0.0}, Want::values)
+          .respond(history, r.time_s, std::vector<double>{100.0, 40.0, tau_s, 0.0, 0.0},
+                   Want::values)
           .value;
   Random random(7);
   for (const double force : f) r.response.push_back(std::max(0.0, force) + 3e-4 * random.normal());
   return r;
 }
 
-Selection fitted(const Recording& recording, std::optional<double> contact) {
+Selection selected(const PreparedRecording& recording, std::optional<double> contact) {
   SelectionOptions options;
   options.laws = {parse_law_name("linear-1", "test")};
   options.only_listed = true;
   options.held_out = false;
   options.setup.contact = contact;
-  const std::vector<PreparedRecording> one{prepare_recording("cycles.csv", recording)};
-  return select_law(one, options);
+  return select_law(std::span(&recording, 1), options);
+}
+
+Selection fitted(const Recording& recording, std::optional<double> contact) {
+  return selected(prepare_recording("cycles.csv", recording), contact);
+}
+
+/// The fit of a file of which the reading keeps the samples from 8 s on, in the rest.
+Selection fitted_from_rest(const std::string& file, const Recording& recording) {
+  std::ofstream table(file);
+  table.precision(17);
+  table << "Time (s),Depth (m),Force (N)\n";
+  for (std::size_t i = 0; i < recording.time_s.size(); ++i) {
+    table << recording.time_s[i] << ',' << recording.drive[i] << ',' << recording.response[i]
+          << '\n';
+  }
+  table.close();
+  ImportOptions import;
+  import.from_s = 8.0;
+  PreparedRecording r = prepare_recording(file, read_recording_file(file, import).recording);
+  r.import = import;
+  return selected(r, 0.0);
 }
 
 }  // namespace
@@ -77,6 +103,41 @@ TEST_CASE("A hold after conditioning cycles is said to be left out, and how it i
                                        [](const ParameterResult& p) { return p.parameter.name; });
   REQUIRE(k_inf != parameters.end());
   CHECK((*k_inf->lower < 100.0 && 100.0 < *k_inf->upper));
+}
+
+TEST_CASE(
+    "Loads that the window of a reading leaves out leave nothing identified until forgotten") {
+  const test::TempFolder folder;
+  const std::string code = "history_before_window";
+  // The cycles end 5 s before the ramp: 7 relaxation times.
+  const Selection after = fitted_from_rest(folder / "short.csv", conditioned(true, 0.7));
+  const FitResult& forgotten = after.candidates.front().fit;
+  CHECK_FALSE(test::has_remark(forgotten.remarks, code));
+  CHECK_FALSE(find(forgotten, "k1").unconfirmed);
+
+  // A third of one: the interval of k1 excludes the truth.
+  const Selection within = fitted_from_rest(folder / "long.csv", conditioned(true, 12.0));
+  const Candidate& chosen = within.candidates.front();
+  const ParameterResult& k1 = find(chosen.fit, "k1");
+  REQUIRE(k1.unconfirmed);
+  CHECK(k1.unconfirmed->code == code);
+  CHECK_THAT(k1.summary, Contains("not identified: history before the window is not in the fit"));
+  CHECK_FALSE(find(chosen.fit, "offset").unconfirmed);
+  CHECK_FALSE(chosen.identified);
+  CHECK_THAT(std::string(test::remark_text(chosen.fit.remarks, code)),
+             Contains("a load ended at 4.9") && Contains("tau1"));
+  CHECK(test::has_remark(fit_and_judge({chosen.fit.config, {}}).remarks, code));  // config.json
+
+  // "from" of a configuration leaves out the same samples and keeps their history.
+  FitConfig config = chosen.fit.config;
+  config.choice.reset();
+  config.data.front().import.from_s.reset();
+  const FitResult whole = fit_and_judge({config, {}});
+  CHECK_FALSE(test::has_remark(whole.remarks, code));
+  const ParameterResult& right = find(whole, "k1");
+  CHECK_FALSE(right.unconfirmed);
+  REQUIRE((right.lower && right.upper));
+  CHECK((*right.lower < 40.0 && 40.0 < *right.upper));
 }
 
 TEST_CASE("Cycles without a hold are told as such") {

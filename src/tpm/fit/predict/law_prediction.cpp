@@ -225,8 +225,8 @@ void add_range_remarks(LawPrediction& p, const LawFile& law) {
     for (const std::string& name : law.uncertainty->unconfirmed) {
       p.remarks.push_back(
           {"parameter_unconfirmed",
-           fmt::format("{} was not identified: the minimum of the fit is not trusted, and the "
-                       "bands suppose it",
+           fmt::format("{} was not identified: the minimum of the fit, or what it rests on, is not "
+                       "trusted, and the bands suppose it",
                        name)});
     }
   }

@@ -18,6 +18,7 @@
 #include "tpm/fit/recording/motion_before_load.hpp"
 #include "tpm/fit/select/configuration_remarks.hpp"
 #include "tpm/fit/select/doubtful_contact.hpp"
+#include "tpm/fit/select/history_before_window.hpp"
 #include "tpm/fit/select/law_choice.hpp"
 #include "tpm/fit/select/reading_scatter.hpp"
 #include "tpm/fit/select/unloading_test.hpp"
@@ -451,7 +452,12 @@ void state_preferred(Selection& s) {
 
 void state_adequacy(Selection& s, std::span<const PreparedRecording> recordings) {
   for (const auto i : {std::optional(s.recommended), s.preferred}) {
-    if (i) doubt_contact(s.candidates[*i].fit);
+    if (!i) continue;
+    Candidate& c = s.candidates[*i];
+    doubt_contact(c.fit);
+    if (!doubt_history(c.fit) || !c.identified) continue;
+    c.identified = false;
+    c.reason = "history before the window is not in the fit";
   }
   state_of_rests(s, recordings);
   state_preferred(s);
@@ -480,6 +486,7 @@ FitResult fit_and_judge(const FitProblem& problem) {
   const std::vector<DataSet> data = problem.data.empty() ? load_data(problem.config) : problem.data;
   FitResult fit = run_fit(problem.config, data);
   give_both_drift_answers(fit, data);
+  if (problem.data.empty()) doubt_history(fit);
   state_adequacy(fit, data);
   state_scatter(fit);
   repeat_choice(fit);

@@ -1,0 +1,120 @@
+#include "tpm/fit/select/history_before_window.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <optional>
+
+#include "tpm/base/text.hpp"
+#include "tpm/files/import/recording_file.hpp"
+#include "tpm/fit/likelihood/load_imposed.hpp"
+#include "tpm/fit/verdict.hpp"
+#include "tpmkit/law_model.hpp"
+
+namespace tpm::fit {
+namespace {
+
+constexpr const char* kHistoryBeforeWindow = "history_before_window";
+
+/// What a law forgets last.
+struct LongestMemory {
+  std::string name;
+  double time_s = 0.0;  ///< infinite for a spring-pot; 0 for a law without memory
+};
+
+LongestMemory longest_memory(const LawSpec& law, std::span<const double> values) {
+  if (law.fractional != Fractional::none) {
+    return {"the memory of a spring-pot", std::numeric_limits<double>::infinity()};
+  }
+  LongestMemory longest;
+  const std::vector<LawParameter> parameters = law_parameters(law);
+  for (std::size_t i = 0; i < parameters.size(); ++i) {
+    const LawParameter& p = parameters[i];
+    if (p.nuisance || p.dimension != Dimension::time || values[i] <= longest.time_s) continue;
+    longest = {p.name, values[i]};
+  }
+  return longest;
+}
+
+/// The file of a recording with the rows that its reading leaves out before the window.
+Recording with_earlier_rows(const FitConfig& config, const DataChoice& choice) {
+  ImportOptions all = choice.import;
+  all.from_s.reset();
+  all.step_time_s.reset();
+  Recording recording = read_recording_file(data_path(config, choice.dataset), all).recording;
+  return choice.load_imposed ? with_imposed_load(std::move(recording)) : recording;
+}
+
+/// When the last load ended that the window leaves out, in the clock of the file.
+std::optional<double> last_load_s(const RecordingFit& r, const Recording& whole, double begin_s,
+                                  std::optional<double> contact) {
+  constexpr double kLoad = 0.02;   // of the largest in the fitted part
+  constexpr double kNoises = 5.0;  // residuals
+  const auto load = [contact](double drive) {
+    return contact ? std::max(drive - *contact, 0.0) : drive;
+  };
+  const double start = load(r.drive.front());
+  double most = 0.0;
+  for (std::size_t i = 0; i < r.drive.size(); ++i) {
+    if (r.fitted[i]) most = std::max(most, std::abs(load(r.drive[i]) - start));
+  }
+  const double seen = std::max(kLoad * r.peak, kNoises * r.rms_residual);
+  std::optional<double> last;
+  for (std::size_t i = 0; i < whole.time_s.size() && whole.time_s[i] < begin_s; ++i) {
+    const bool loaded = std::abs(load(whole.drive[i]) - start) > kLoad * most;
+    if (loaded && std::abs(whole.response[i] - r.observed.front()) > seen) last = whole.time_s[i];
+  }
+  return last;
+}
+
+/// What a reader must know of a recording; empty if its history is complete, or forgotten.
+std::string history_words(const FitResult& fit, const RecordingFit& r) {
+  constexpr double kForgotten = 5.0;  // relaxation times: exp(-5) is 0.7 %
+  const DataChoice& choice = fit.config.data[r.choice];
+  if (!choice.import.from_s && !choice.import.step_time_s) return {};
+  const LawModel model(*fit.config.law);
+  const std::vector<double> values = model_parameters(fit.config, fit.best.natural, r.choice);
+  const LongestMemory memory = longest_memory(*fit.config.law, values);
+  const auto first = std::ranges::find(r.fitted, true);
+  if (!(memory.time_s > 0.0) || first == r.fitted.end()) return {};
+  std::optional<double> contact;
+  if (r.drive_quantity == Quantity::indentation_depth) contact = values[model.index("contact")];
+  const double clock_s = choice.import.step_time_s.value_or(0.0);
+  const double fitted_s = clock_s + r.time_s[static_cast<std::size_t>(first - r.fitted.begin())];
+  const auto last =
+      last_load_s(r, with_earlier_rows(fit.config, choice), clock_s + r.time_s.front(), contact);
+  if (!last || fitted_s - *last >= kForgotten * memory.time_s) return {};
+  return fmt::format(
+      "{}: history before the window is not in the fit: a load ended at {} s of the file, {} s "
+      "before the fitted part, and {}; in config.json the key \"from\" of the recording, without "
+      "{} in its \"import\", leaves out the same samples and keeps their history, with contact "
+      "lost and found again as the law has it",
+      choice.dataset, significant(*last, 4), significant(fitted_s - *last, 3),
+      std::isfinite(memory.time_s) ? fmt::format("{} = {} s is more than a fifth of that",
+                                                 memory.name, significant(memory.time_s, 3))
+                                   : memory.name + " has no end",
+      choice.import.step_time_s ? "\"step_time\" (times then count as in the file)" : "\"from\"");
+}
+
+}  // namespace
+
+bool doubt_history(FitResult& fit) {
+  if (!fit.config.law) return false;
+  std::vector<Remark> remarks;
+  for (const RecordingFit& r : fit.recordings) {
+    std::string words = history_words(fit, r);
+    if (!words.empty()) remarks.push_back({kHistoryBeforeWindow, std::move(words)});
+  }
+  if (remarks.empty()) return false;
+  std::ranges::move(remarks, std::back_inserter(fit.remarks));
+  for (ParameterResult& p : fit.parameters) {
+    const bool said = p.verdict == Verdict::failed || p.verdict == Verdict::flat;
+    if (p.nuisance || said || p.unconfirmed || p.not_separable) continue;
+    p.unconfirmed = Remark{kHistoryBeforeWindow, "history before the window is not in the fit"};
+    p.summary = parameter_words(p, fit.config.level);
+  }
+  return true;
+}
+
+}  // namespace tpm::fit

@@ -1,0 +1,17 @@
+#pragma once
+#include "tpm/fit/fit.hpp"
+
+namespace tpm::fit {
+
+/// Whether a law is fitted without loads that the material still remembered. Rows that --from-time
+/// or --step-time leave out when a file is read are no part of the history that drives the law: it
+/// then rests at the drive of the first row that is kept. The file is read once more without them.
+/// Where a load among them (2 % of the largest fitted drive from contact, with a response beyond
+/// the residual) ended less than 5 times the longest relaxation time before the fitted part, or the
+/// law has a spring-pot, whose memory has no end, no parameter of the material is identified
+/// (ParameterResult::unconfirmed), and a remark says so. A window "from" of a configuration keeps
+/// the history and is not concerned.
+/// @return true if a parameter lost its verdict
+bool doubt_history(FitResult& fit);
+
+}  // namespace tpm::fit
