@@ -76,8 +76,11 @@ TEST_CASE("a run tells once that a scene without E and without a spacing law kee
   const TempFolder folder;
   const auto told = [&](const std::string& bonds) {
     const std::string scene = folder / "s.json";
-    write_scene(scene, R"({"organ": {"kind": "block", "cells": [2, 2, 2]},)" + bonds +
-                           R"("anchors": [{"kind": "inner_layer"}],)" + kShallowPush + "}");
+    write_scene(scene, R"({"organ": {"kind": "block", "cells": [3, 3, 3], "spacing": "20 mm"},)" +
+                           bonds +
+                           R"("anchors": [{"kind": "inner_layer"}],
+                "contacts": [{"kind": "sphere", "number": 30}],)" +
+                           kShallowPush + "}");
     const std::string errors = folder / "errors.txt";
     REQUIRE(exit_code(command_for(scene, folder / "out.h5", ">/dev/null 2>") + "'" + errors +
                       "'") == 0);
