@@ -1,4 +1,6 @@
 // tpm export: the relaxation of a law for finite element programs, an organ for physics engines.
+#include <fmt/format.h>
+
 #include <filesystem>
 #include <memory>
 #include <optional>
@@ -9,7 +11,9 @@
 #include "option_kinds.hpp"
 #include "tpm/base/namespaces.hpp"
 #include "tpm/files/blocks/law_export.hpp"
+#include "tpm/files/blocks/law_json.hpp"
 #include "tpm/files/json.hpp"
+#include "tpm/files/other_kind.hpp"
 #include "tpm/organ/scene/organ_export.hpp"
 #include "tpmkit/error.hpp"
 #include "tpmkit/units.hpp"
@@ -60,9 +64,19 @@ ExportOptions options_of(const ExportTexts& texts) {
   return options;
 }
 
+/// Throws Error(usage) for an organ, which other programs take.
+void require_no_scene(const Json& document, const ExportTexts& texts) {
+  if (!document.is_object() || !document.contains("organ")) return;
+  throw Error(ExitCode::usage, "--to " + texts.to,
+              fmt::format("exports a law, and {} is a scene", printable(texts.law)),
+              fmt::format("for a scene --to {}", fmt::join(organ_targets(), " or ")));
+}
+
 int export_law_file(const ExportTexts& texts) {
   const ExportOptions options = options_of(texts);
-  const LawFile law = read_law(texts.law);
+  const Json document = read_json_of(texts.law, "law");
+  require_no_scene(document, texts);
+  const LawFile law = law_from_json(document, texts.law);
   const std::string text = export_law(law, options);
   for (const Remark& remark : export_remarks(law, options)) {
     tell_user("tpm: warning: {}\n", remark.text);

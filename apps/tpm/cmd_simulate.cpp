@@ -58,8 +58,9 @@ struct Simulated {
 double checkpoint_interval_s(const SimulateChoice& choice) {
   const double every =
       option_quantity(choice.checkpoint_every, Dimension::time, "--checkpoint-every");
-  if (every >= 0.0) return every;
-  throw Error(ExitCode::usage, "--checkpoint-every", choice.checkpoint_every, "0 s or more");
+  if (every > 0.0) return every;
+  throw Error(ExitCode::usage, "--checkpoint-every", choice.checkpoint_every,
+              "a time above 0 s, such as \"5 s\"");
 }
 
 SimulationRun run_watched(const ExperimentScene& scene, const RunNetwork& network,
@@ -79,6 +80,13 @@ SimulationRun run_watched(const ExperimentScene& scene, const RunNetwork& networ
   controls.checkpoint_every_s = checkpoint_every_s;
   controls.note = [](const std::string& text) { tell_user("tpm: {}\n", text); };
   return simulate(scene, network, controls);
+}
+
+/// The law that a scene keeps because it states none, as `network build` says it.
+void tell_spacing_law(const ExperimentScene& scene) {
+  for (const Remark& assumption : scene.tissue.network.organ.assumptions) {
+    if (assumption.code == kSpacingLawKept) tell_user("tpm: assumed: {}\n", assumption.text);
+  }
 }
 
 /// Of large networks what the first output waits for: until then nothing says how long a run takes.
@@ -208,6 +216,7 @@ int simulate_trajectory(const SimulateChoice& choice, const ExperimentScene& sce
   const std::vector<double> times = times_to_watch(scene);
   const Trajectory answer = run_scene(scene, times, scene.formulation.entry().can().field);
   write_scene_run(scene, times, answer, choice.output);
+  tell_spacing_law(scene);
   say_with_files(session, scene_run_json(scene, times, answer),
                  scene_run_text(scene, times, answer), {choice.output});
   return 0;
@@ -243,6 +252,7 @@ int simulate_and_report(const SimulateChoice& choice, const Session& session) {
   }
   const std::vector<Simulated> all = simulate_all(choice, std::move(scene), session.output_naming);
   const std::vector<std::string> files = write_all(choice, all);
+  tell_spacing_law(all.front().scene);
   Json json;
   std::string text;
   ShortAnswer answer;
@@ -291,6 +301,7 @@ int simulate_planned(const SimulateChoice& choice, const Session& session) {
   const std::vector<double> times = times_to_watch(scene);
   const Trajectory answer = run_planned(plan, scene, times);
   write_planned_run(plan, scene, times, answer, choice.output);
+  tell_spacing_law(scene);
   if (session.json() || choice.verbose) {
     // Verbose: also which candidates were considered, and what the plan says of them.
     say_with_files(session, planned_run_json(plan, scene, times, answer),

@@ -112,13 +112,14 @@ std::vector<std::string> with_option(const CLI::App& command, const std::string&
   return found;
 }
 
-/// Commands that have this option: those that stand nearest to this one, at most three.
+/// Commands that have this option: those that stand nearest to this one. None if there are more
+/// than three, of which most do something else.
 std::vector<std::string> elsewhere(const CLI::App& command, const std::string& name) {
   constexpr std::size_t kMost = 3;
   if (!name.starts_with("--")) return {};
   for (const CLI::App* app = &command; app != nullptr; app = app->get_parent()) {
     std::vector<std::string> found = with_option(*app, name);
-    if (found.size() > kMost) found.resize(kMost);
+    if (found.size() > kMost) return {};
     if (!found.empty()) return found;
   }
   return {};
@@ -129,7 +130,12 @@ std::string no_such_option(const CLI::App& command, std::string_view word) {
   const std::string nearest = nearest_word(name, options_of(command));
   const std::vector<std::string> others = elsewhere(command, name);
   std::string meant;
-  if (!nearest.empty()) {
+  if (name == "--overwrite") {
+    // Commands that ask for it have it.
+    if (command.get_option_no_throw("--output") != nullptr) {
+      meant = "the file that -o names is replaced without it; ";
+    }
+  } else if (!nearest.empty()) {
     meant = fmt::format("did you mean '{}'? ", nearest);
   } else if (!others.empty()) {
     meant = fmt::format("did you mean {}? ", fmt::join(others, " or "));

@@ -125,6 +125,14 @@ TEST_CASE("a wrong word is named, with the nearest right one and the help to rea
         "tpm hil verify --help");
   check("paper tables --bootstrap 5", "paper tables: no option '--bootstrap'",
         "did you mean 'tpm fit --bootstrap'", "tpm paper tables --help");
+  // A command that replaces what it was told to write needs no other one's permission.
+  check("network build --overwrite -o x.h5", "network build: no option '--overwrite'",
+        "the file that -o names is replaced without it", "tpm network build --help");
+  for (const char* line :
+       {"network build --overwrite", "network check --overwrite", "network build --folder x"}) {
+    CAPTURE(line);
+    CHECK_THAT(answer_to(line).error, Contains("no option") && !Contains("did you mean"));
+  }
   check("sweep polt x.h5", "sweep: no command 'polt'", "'plot'", "tpm sweep --help");
   check("--verison", "no option '--verison'", "'--version'", "tpm --help");
   check("qqqqqqq", "no command 'qqqqqqq'", "expected one of example, data", "see tpm --help");

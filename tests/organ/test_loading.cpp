@@ -13,6 +13,7 @@
 using namespace tpm;
 using namespace tpm::organ;
 using Catch::Matchers::Contains;
+using Catch::Matchers::StartsWith;
 using Catch::Matchers::WithinAbs;
 using Catch::Matchers::WithinRel;
 
@@ -289,6 +290,29 @@ TEST_CASE("a scene that states neither E nor a spacing law is told which law it 
   CHECK(told(json));
   json["bonds"] = {{"spacing_law", "paper"}};
   CHECK_FALSE(told(json));
+}
+
+TEST_CASE("a pressure that pulls is told with the sign of what it sums to") {
+  Json json = block_scene();
+  json["contacts"] = {pushed_sphere(two_upper_spheres().first)};
+  json["protocol"] = kRamp;
+  const auto words = [&](const char* pressure) {
+    json["loads"] = {{{"kind", "pressure"}, {"pressure", pressure}}};
+    return parsed_scene(json).load_words.at(0);
+  };
+  CHECK_THAT(words("-10 Pa"), StartsWith("pressure of -10 Pa on ") && Contains(" cm^2: -0."));
+  CHECK_THAT(words("10 Pa"), StartsWith("pressure of 10 Pa on ") && Contains(" cm^2: 0."));
+}
+
+TEST_CASE("a sphere that two contacts drive is refused by file and contact") {
+  Json json = block_scene();
+  json["protocol"] = kRamp;
+  json["contacts"] = {pushed_sphere(two_upper_spheres().first),
+                      pushed_sphere(two_upper_spheres().second)};
+  CHECK_NOTHROW(parsed_scene(json));
+  json["contacts"][1] = json["contacts"][0];
+  CHECK_THROWS_WITH(parsed_scene(json), Contains("/contacts/1: drives sphere ") &&
+                                            Contains("which contact /contacts/0 drives too"));
 }
 
 TEST_CASE("scenes with several protocols that make no sense are refused") {

@@ -54,7 +54,7 @@ int stop_after_checkpoint(const std::string& scene, const std::string& output,
   return exit_code(fmt::format(
       "exec 2>/dev/null; {} & p=$!; while kill -0 $p && [ ! -e \"{}.checkpoint\" ]; do sleep 0.01; "
       "done; kill -{} $p; wait $p",
-      command_for(scene, output, "--checkpoint-every '0 s' >/dev/null"), output, signal));
+      command_for(scene, output, "--checkpoint-every '1 us' >/dev/null"), output, signal));
 }
 
 std::set<std::string> keys_of(const Json& json) {
@@ -71,6 +71,26 @@ std::set<std::string> keys_of(const Json& json) {
 }
 
 }  // namespace
+
+TEST_CASE("a run tells once that a scene without E and without a spacing law keeps the paper's") {
+  const TempFolder folder;
+  const auto told = [&](const std::string& bonds) {
+    const std::string scene = folder / "s.json";
+    write_scene(scene, R"({"organ": {"kind": "block", "cells": [3, 3, 3], "spacing": "20 mm"},)" +
+                           bonds +
+                           R"("anchors": [{"kind": "inner_layer"}],
+                "contacts": [{"kind": "sphere", "number": 30}],)" +
+                           kShallowPush + "}");
+    const std::string errors = folder / "errors.txt";
+    REQUIRE(exit_code(command_for(scene, folder / "out.h5", ">/dev/null 2>") + "'" + errors +
+                      "'") == 0);
+    const std::string text = read_file(errors);
+    const std::regex words("assumed: spacing law paper");
+    return std::distance(std::sregex_iterator(text.begin(), text.end(), words), {});
+  };
+  CHECK(told("") == 1);
+  CHECK(told(R"("bonds": {"spacing_law": "paper"},)") == 0);
+}
 
 TEST_CASE("the file of a run holds its scene, version, tolerance, and what was found", "[heavy]") {
   const TempFolder folder;

@@ -152,6 +152,8 @@ inline std::vector<ErrorCase> scene_cases() {
        organ(R"("kind": "liver")")},
       {type, "organ exported with a law's option",
        "export {}/s.json --to sofa --radius \"2 mm\" -o {}/out", organ(R"("kind": "liver")")},
+      {type, "organ exported as a law", "export {}/s.json --to abaqus -o {}/out",
+       organ(R"("kind": "liver")")},
       {type, "law in its place", "simulate {}/s.json -o {}/out.h5",
        scene(R"({"law": "linear-1", "response": "contact_force"})")},
       {type, "unknown key", check, organ(R"("kind": "liver", "cuont": 424)")},

@@ -123,6 +123,8 @@ inline std::vector<ErrorCase> simulation_error_cases() {
       {type, "tolerance of 0", simulate, pushed(R"("tolerance": 0)")},
       {type, "checkpoints of another unit", simulate + " --checkpoint-every '5 mm'",
        pushed(R"("title": "t")")},
+      {type, "checkpoints without a pause", simulate + " --checkpoint-every '0 s'",
+       pushed(R"("title": "t")")},
       {type, "tolerance of a plan that is not asked for",
        "simulate {}/s.json --tolerance 1e-3 -o {}/out.h5", pushed(R"("title": "t")")},
       {type, "output of another kind", "simulate {}/s.json -o {}/out.csv",

@@ -202,8 +202,9 @@ void settle(const Surface& surface, SolidFilling& filling) {
 }
 
 /// @param most spheres; the lattice's shallowest are left out
+/// @param asked depth up to which spheres are asked how deep they lie, in spacings
 SolidFilling lattice_filling(const Surface& surface, const SolidRequest& request, double spacing,
-                             std::size_t most, KnownMargins& known) {
+                             std::size_t most, KnownMargins& known, double asked) {
   SolidFilling filling;
   filling.spacing = spacing;
   std::vector<double> least;
@@ -216,7 +217,7 @@ SolidFilling lattice_filling(const Surface& surface, const SolidRequest& request
   for (Eigen::Index i = 0; i < filling.outer.cols(); ++i) {
     filling.normal.col(i) = surface.nearest(filling.outer.col(i)).normal;
   }
-  filling.inner = by_depth(surface, lattice, least, (1.0 + 1e-9) * kShallow * spacing);
+  filling.inner = by_depth(surface, lattice, least, (1.0 + 1e-9) * asked * spacing);
   filling.lattice_points = filling.next_point = lattice.cols();
   const auto outer = static_cast<std::size_t>(filling.outer.cols());
   if (const std::size_t room = most - outer; room < filling.inner.size()) {
@@ -229,7 +230,8 @@ SolidFilling lattice_filling(const Surface& surface, const SolidRequest& request
   return filling;
 }
 
-/// The inner spheres that an outer one or a place below it may touch: the shallow ones.
+/// The inner spheres that an outer one or a place below it may touch: the shallow ones, and deeper
+/// ones of a filling that is not settled, which none of these touches.
 Positions shallow(const SolidFilling& filling) {
   std::vector<Vector3d> found;
   for (const InnerSphere& sphere : filling.inner) {
@@ -418,7 +420,7 @@ SolidFilling counted_filling(const Surface& surface, const SolidRequest& request
   SolidFilling filling;
   for (int round = 0; round < kRounds; ++round) {
     const double spacing = spacing_for(surface, request.lattice, lattice, known);
-    filling = lattice_filling(surface, request, spacing, 2 * count, known);
+    filling = lattice_filling(surface, request, spacing, 2 * count, known, 0.0);
     add_support(surface, filling, kWantedInside, count);
     if (filling.count() >= count) break;
     lattice += count - filling.count();
@@ -451,7 +453,7 @@ Organ fill_solid(const Surface& surface, const SolidRequest& request) {
   const double spacing = decided_spacing(surface, request, known);
   require_room(surface, spacing);
   const std::size_t most = request.count.value_or(std::numeric_limits<std::size_t>::max());
-  SolidFilling filling = lattice_filling(surface, request, spacing, most, known);
+  SolidFilling filling = lattice_filling(surface, request, spacing, most, known, kShallow);
   if (const std::size_t added = add_support(surface, filling, kWantedInside, most);
       added > 0 && request.count) {
     filling = counted_filling(surface, request, std::move(filling), added, known);

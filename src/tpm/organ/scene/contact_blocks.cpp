@@ -5,6 +5,7 @@
 #include <array>
 #include <cmath>
 #include <limits>
+#include <map>
 
 #include "tpm/base/enum_names.hpp"
 #include "tpm/base/text.hpp"
@@ -73,6 +74,23 @@ void require_patch_free(const SceneContact& patch, const Tissue& tissue,
         place.key("radius").where,
         fmt::format("the patch has sphere {}, which cannot move along the push", sphere + 1),
         "a smaller radius, or a place away from anchors and sliders");
+  }
+}
+
+/// Tools may press where others do.
+void require_driven_once(const std::vector<SceneContact>& contacts, const Organ& organ,
+                         const DocumentPlace& place) {
+  std::map<std::size_t, std::size_t> driven_by;
+  for (std::size_t i = 0; i < contacts.size(); ++i) {
+    if (contacts[i].is_tool()) continue;
+    for (const std::size_t sphere : spheres_of(contacts[i], organ)) {
+      const auto [first, is_new] = driven_by.emplace(sphere, i);
+      if (is_new) continue;
+      throw bad_input(place.key(std::to_string(i)).where,
+                      fmt::format("drives sphere {}, which contact /contacts/{} drives too",
+                                  sphere + 1, first->second),
+                      "each sphere in one contact");
+    }
   }
 }
 
@@ -172,6 +190,7 @@ std::vector<SceneContact> contacts_of(const std::vector<ContactKeys>& contacts,
       all.back().protocol = protocol_of(*block.protocol, entry.key("protocol"), folder);
     }
   }
+  require_driven_once(all, tissue.network.organ, place);
   if (all.front().probe.share > 0.0) return all;
   throw bad_input(place.key("0").key("share").where, "the first contact stands still",
                   "one that is driven first");

@@ -2,6 +2,8 @@
 
 #include <fmt/format.h>
 
+#include <cmath>
+
 #include "tpm/base/text.hpp"
 #include "tpm/organ/body/outer_area.hpp"
 #include "tpm/organ/bonds/lowest_mode.hpp"
@@ -65,7 +67,7 @@ std::string pressure_on(const LoadKeys& load, const Organ& organ, const Document
   }
   return fmt::format("pressure of {} Pa on {} spheres, {} cm^2: {} N in sum",
                      significant(load.pressure_Pa, 4), spheres.size(), significant(1e4 * sum_m2, 4),
-                     significant(sum_N.norm(), 4));
+                     significant(std::copysign(sum_N.norm(), load.pressure_Pa), 4));
 }
 
 }  // namespace

@@ -204,7 +204,7 @@ Tissue tissue_of(const SceneKeys& scene, std::string_view where,
     scale_to_tissue(*scene.material.E_Pa, scene.material.nu, tissue, place.key("material"));
   } else if (!scene.bonds.spacing_law && !star) {
     tissue.network.organ.assumptions.push_back(
-        {"spacing_law_paper",
+        {std::string(kSpacingLawKept),
          "spacing law paper, since the scene states neither E nor a law: the stiffness of a bond "
          "does not follow the spacing"});
   }

@@ -21,6 +21,9 @@ struct Slider {
   Eigen::Vector3d direction;  ///< unit vector
 };
 
+/// Code of the assumption of a scene that states neither E nor a spacing law: the paper's is kept.
+inline constexpr std::string_view kSpacingLawKept = "spacing_law_paper";
+
 /// Tissue of a scene: spheres, bonds, material, and constraints.
 struct Tissue {
   std::string title;
