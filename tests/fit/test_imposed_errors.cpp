@@ -107,10 +107,20 @@ TEST_CASE("a contact that only a power with an exponent of no probe tells is not
   CHECK(*far.upper < -4e-5);  // it was at 0
   CHECK_THAT(verdict_text(far), StartsWith("not identified: contact or a loading"));
   CHECK_THAT(far.summary, Contains("interval without such a loading"));
+  // The stiffnesses and the exponent are those of a power from that contact; the time is not.
+  for (const char* name : {"k_inf", "k1", "exponent"}) {
+    const ParameterResult& p = parameter_of(layer, name);
+    CHECK(p.verdict == Verdict::identified);
+    CHECK_THAT(verdict_text(p), StartsWith("not identified: contact or a loading"));
+    CHECK_THAT(p.summary, Contains("is not identified") && Contains("without such a loading"));
+  }
+  CHECK_FALSE(parameter_of(layer, "tau1").not_separable);
   const Selection straight = selected_of(recording_of(false), "power-1", true);
   const ParameterResult& near =
       parameter_of(straight.candidates[straight.recommended].fit, "contact");
-  CHECK_FALSE(near.not_separable);
+  for (const ParameterResult& p : straight.candidates[straight.recommended].fit.parameters) {
+    CHECK_FALSE(p.not_separable);
+  }
   CHECK(near.lower.value() < 0.0);
   CHECK(near.upper.value() > 0.0);
 }
