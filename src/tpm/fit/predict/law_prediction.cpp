@@ -218,8 +218,8 @@ void add_range_remarks(LawPrediction& p, const LawFile& law) {
       p.remarks.push_back(
           {"parameter_not_separable",
            fmt::format(
-               "{} was not told from something else (a drift, a slower branch or a floor of "
-               "the instrument): the bands suppose that there was none",
+               "{} was not told from something else (a drift, a slower branch, a floor of the "
+               "instrument or a loading that is no power): the bands suppose that there was none",
                name)});
     }
     for (const std::string& name : law.uncertainty->unconfirmed) {

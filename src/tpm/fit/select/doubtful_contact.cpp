@@ -21,21 +21,38 @@ bool has_exponent_of_no_probe(const FitResult& fit) {
   });
 }
 
+/// True for a coefficient or the exponent of a power of the depth: it is counted from the contact.
+bool is_counted_from_contact(const ParameterResult& p) {
+  const Dimension dimension = p.parameter.unit.dimension;
+  return !p.nuisance && (dimension == Dimension::stiffness || dimension == Dimension::stress ||
+                         p.parameter.name == "exponent");
+}
+
 }  // namespace
 
 void doubt_contact(FitResult& fit) {
   constexpr double kMuchLess = 3.0;  // times the standard error
   if (!fit.config.law || fit.config.law->kernel != Kernel::power) return;
   if (!has_exponent_of_no_probe(fit)) return;
+  const Remark doubt{kContactOrLoading, "contact or a loading that is no power of the depth"};
+  const auto mark = [&](ParameterResult& p) {
+    if (p.verdict != Verdict::identified || p.not_separable) return;
+    p.not_separable = doubt;
+    p.summary = parameter_words(p, fit.config.level);
+  };
+  bool doubted = false;
   for (std::size_t i = 0; i < fit.parameters.size() && i < fit.config.parameters.size(); ++i) {
     ParameterResult& p = fit.parameters[i];
     const auto& prior = fit.config.parameters[i].prior;
     const bool contact = p.nuisance && is_contact(fit.config, i);
     if (!contact || p.verdict != Verdict::identified || p.not_separable) continue;
     if (!prior || !p.standard_error || prior->sd < kMuchLess * *p.standard_error) continue;
-    p.not_separable =
-        Remark{kContactOrLoading, "contact or a loading that is no power of the depth"};
-    p.summary = parameter_words(p, fit.config.level);
+    mark(p);
+    doubted = true;
+  }
+  if (!doubted) return;
+  for (ParameterResult& p : fit.parameters) {
+    if (is_counted_from_contact(p)) mark(p);
   }
 }
 
