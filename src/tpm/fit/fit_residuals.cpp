@@ -65,8 +65,8 @@ MultiStart run_starts(const ResidualFunction& function, std::span<const FitParam
     result.end_deviances.push_back(m.usable ? m.deviance
                                             : std::numeric_limits<double>::quiet_NaN());
     if (m.usable) {
-      const std::size_t start = result.end_deviances.size() - 1;
-      ends.emplace_back(std::move(m), led_there.empty() ? 1 : led_there[start]);
+      const std::size_t last = result.end_deviances.size() - 1;
+      ends.emplace_back(std::move(m), led_there.empty() ? 1 : led_there[last]);
     } else {
       ++result.failed;
     }

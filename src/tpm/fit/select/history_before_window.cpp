@@ -50,7 +50,7 @@ Recording with_earlier_rows(const FitConfig& config, const DataChoice& choice) {
 std::optional<double> last_load_s(const RecordingFit& r, const Recording& whole, double begin_s,
                                   std::optional<double> contact) {
   constexpr double kLoad = 0.02;   // of the largest in the fitted part
-  constexpr double kNoises = 5.0;  // residuals
+  constexpr double kResiduals = 5.0;  // residuals
   const auto load = [contact](double drive) {
     return contact ? std::max(drive - *contact, 0.0) : drive;
   };
@@ -59,7 +59,7 @@ std::optional<double> last_load_s(const RecordingFit& r, const Recording& whole,
   for (std::size_t i = 0; i < r.drive.size(); ++i) {
     if (r.fitted[i]) most = std::max(most, std::abs(load(r.drive[i]) - start));
   }
-  const double seen = std::max(kLoad * r.peak, kNoises * r.rms_residual);
+  const double seen = std::max(kLoad * r.peak, kResiduals * r.rms_residual);
   std::optional<double> last;
   for (std::size_t i = 0; i < whole.time_s.size() && whole.time_s[i] < begin_s; ++i) {
     const bool loaded = std::abs(load(whole.drive[i]) - start) > kLoad * most;
