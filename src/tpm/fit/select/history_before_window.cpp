@@ -49,7 +49,7 @@ Recording with_earlier_rows(const FitConfig& config, const DataChoice& choice) {
 /// When the last load ended that the window leaves out, in the clock of the file.
 std::optional<double> last_load_s(const RecordingFit& r, const Recording& whole, double begin_s,
                                   std::optional<double> contact) {
-  constexpr double kLoad = 0.02;   // of the largest in the fitted part
+  constexpr double kLoad = 0.02;      // of the largest in the fitted part
   constexpr double kResiduals = 5.0;  // residuals
   const auto load = [contact](double drive) {
     return contact ? std::max(drive - *contact, 0.0) : drive;
