@@ -14,6 +14,7 @@
 #include "plan_options.hpp"
 #include "tpm/base/text.hpp"
 #include "tpm/files/file_roles.hpp"
+#include "tpm/files/json.hpp"
 #include "tpm/files/replacement.hpp"
 #include "tpm/haptics/show/formulation_list.hpp"
 #include "tpm/organ/run/recorder.hpp"
@@ -82,11 +83,18 @@ SimulationRun run_watched(const ExperimentScene& scene, const RunNetwork& networ
   return simulate(scene, network, controls);
 }
 
-/// The law that a scene keeps because it states none, as `network build` says it.
-void tell_spacing_law(const ExperimentScene& scene) {
+/// Says the law that a scene keeps because it states none, as `network build` does: a remark of the
+/// result in JSON, else a line beside the text.
+Json with_spacing_law(Json result, const ExperimentScene& scene, const Session& session) {
   for (const Remark& assumption : scene.tissue.network.organ.assumptions) {
-    if (assumption.code == kSpacingLawKept) tell_user("tpm: assumed: {}\n", assumption.text);
+    if (assumption.code != kSpacingLawKept) continue;
+    if (session.json()) {
+      result["remarks"].push_back(remark_json(assumption));
+    } else {
+      tell_user("tpm: assumed: {}\n", assumption.text);
+    }
   }
+  return result;
 }
 
 /// Of large networks what the first output waits for: until then nothing says how long a run takes.
@@ -216,8 +224,7 @@ int simulate_trajectory(const SimulateChoice& choice, const ExperimentScene& sce
   const std::vector<double> times = times_to_watch(scene);
   const Trajectory answer = run_scene(scene, times, scene.formulation.entry().can().field);
   write_scene_run(scene, times, answer, choice.output);
-  tell_spacing_law(scene);
-  say_with_files(session, scene_run_json(scene, times, answer),
+  say_with_files(session, with_spacing_law(scene_run_json(scene, times, answer), scene, session),
                  scene_run_text(scene, times, answer), {choice.output});
   return 0;
 }
@@ -252,7 +259,6 @@ int simulate_and_report(const SimulateChoice& choice, const Session& session) {
   }
   const std::vector<Simulated> all = simulate_all(choice, std::move(scene), session.output_naming);
   const std::vector<std::string> files = write_all(choice, all);
-  tell_spacing_law(all.front().scene);
   Json json;
   std::string text;
   ShortAnswer answer;
@@ -266,6 +272,7 @@ int simulate_and_report(const SimulateChoice& choice, const Session& session) {
       add_beside(answer, short_answer(s.scene, s.network, s.run));
     }
   }
+  json = with_spacing_law(std::move(json), all.front().scene, session);
   if (session.json() || choice.verbose) {
     say_with_files(session, std::move(json), text, files);
     return 0;
@@ -301,11 +308,12 @@ int simulate_planned(const SimulateChoice& choice, const Session& session) {
   const std::vector<double> times = times_to_watch(scene);
   const Trajectory answer = run_planned(plan, scene, times);
   write_planned_run(plan, scene, times, answer, choice.output);
-  tell_spacing_law(scene);
+  const Json result =
+      with_spacing_law(planned_run_json(plan, scene, times, answer), scene, session);
   if (session.json() || choice.verbose) {
     // Verbose: also which candidates were considered, and what the plan says of them.
-    say_with_files(session, planned_run_json(plan, scene, times, answer),
-                   plan_text(plan) + "\n" + planned_run_text(plan, times, answer), {choice.output});
+    say_with_files(session, result, plan_text(plan) + "\n" + planned_run_text(plan, times, answer),
+                   {choice.output});
     return 0;
   }
   ShortAnswer brief = short_answer(plan, times, answer);

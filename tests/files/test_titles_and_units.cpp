@@ -194,7 +194,7 @@ TEST_CASE("titles and units are read in comments, which name no columns otherwis
 }
 
 TEST_CASE("columns of logarithms are refused by their titles") {
-  for (const char* titles : {"log w,log G',log G''", "log10(omega);log10(G');log10(G'')",
+  for (const char* titles : {"log w,log G',log G''", "log10(omega),log10(G'),log10(G'')",
                              "lg f / Hz,lg E' / Pa,lg E'' / Pa", "ln t,ln force,ln depth"}) {
     CAPTURE(titles);
     CHECK_THAT(refusal_of_titles(titles),

@@ -71,7 +71,7 @@ std::optional<FloorOfReadings> find_floor(const Recording& step, const FitResult
   return floor;
 }
 
-bool doubt_small_plateau(FitResult& fit) {
+bool doubt_small_plateau(FitResult& fit, bool times_stated) {
   constexpr double kScatters = 3.0, kOfLeast = 0.5;
   const auto least = least_stiffness(fit);
   if (!least || fit.config.data.size() != 1) return false;
@@ -84,7 +84,7 @@ bool doubt_small_plateau(FitResult& fit) {
     const bool compliance = fit.data.front().datum.quantity == Quantity::creep_compliance;
     if (!compliance && scatter && p.estimate < kScatters * *scatter) {
       p.not_separable = Remark{kPlateauOrFloor, "the plateau or a floor of the instrument"};
-    } else if (p.estimate < kOfLeast * *least) {
+    } else if (!times_stated && p.estimate < kOfLeast * *least) {
       p.not_separable = Remark{kPlateauOrBranch, "the plateau or a slower branch"};
     } else {
       continue;

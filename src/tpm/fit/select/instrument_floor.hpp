@@ -25,9 +25,10 @@ struct FloorOfReadings {
 /// - it is below 3 times the scatter that a reading of 0 may have (most_scatter_of_small): an
 ///   instrument that reads no negative values has a mean of 0.8 of it, and looks the same; or
 /// - it is below half of the least stiffness that was read: no reading shows the plateau.
+///   Not where the relaxation times are stated: then no slower branch is possible.
 /// The configuration of the fit says it, too.
 /// @return true if it is doubted
-bool doubt_small_plateau(FitResult& fit);
+bool doubt_small_plateau(FitResult& fit, bool times_stated);
 
 /// Where the lasting stiffness is doubted, so is each parameter that has another value without one.
 /// @param fluid fit of the same law without it

@@ -387,7 +387,8 @@ Selection select_law(const MaterialFunction& function, const SelectionOptions& o
   };
   settle_choice(s, kEndlessHold, options.setup.profiles ? ProfiledFit(with_profiles) : nullptr);
   for (const auto i : {std::optional(s.recommended), s.preferred}) {
-    if (!i || !doubt_small_plateau(s.candidates[*i].fit)) continue;
+    const bool times_stated = !options.setup.times_s.empty();
+    if (!i || !doubt_small_plateau(s.candidates[*i].fit, times_stated)) continue;
     LawSpec fluid = s.candidates[*i].law;
     if (fluid.branches == 0 || fluid.form != BranchForm::parallel) continue;
     fluid.solid = false;
