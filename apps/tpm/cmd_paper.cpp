@@ -11,7 +11,8 @@ void add_paper_command(CLI::App& app, Session& session) {
   add_tables_command(*command, session);
   add_audit_command(*command, session);
   add_experiments_command(*command, session);
-  command->footer("Example:\n  tpm paper tables --depths 2,4,6,8 --spacings 20,25,30,35");
+  command->footer(
+      "Example:\n  tpm paper tables --depths \"2,4,6,8 mm\" --spacings \"20,25,30,35 mm\"");
 }
 
 }  // namespace tpm::app
