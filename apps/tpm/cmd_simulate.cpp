@@ -83,18 +83,20 @@ SimulationRun run_watched(const ExperimentScene& scene, const RunNetwork& networ
   return simulate(scene, network, controls);
 }
 
-/// Says the law that a scene keeps because it states none, as `network build` does: a remark of the
-/// result in JSON, else a line beside the text.
-Json with_spacing_law(Json result, const ExperimentScene& scene, const Session& session) {
+/// Adds the law that a scene keeps because it states none.
+Json with_spacing_law(Json result, const ExperimentScene& scene) {
   for (const Remark& assumption : scene.tissue.network.organ.assumptions) {
-    if (assumption.code != kSpacingLawKept) continue;
-    if (session.json()) {
-      result["remarks"].push_back(remark_json(assumption));
-    } else {
-      tell_user("tpm: assumed: {}\n", assumption.text);
-    }
+    if (assumption.code == kSpacingLawKept) result["remarks"].push_back(remark_json(assumption));
   }
   return result;
+}
+
+/// The same beside the text, as `network build` says it; last, so that an error stands alone.
+void tell_spacing_law(const ExperimentScene& scene, const Session& session) {
+  if (session.json()) return;
+  for (const Remark& assumption : scene.tissue.network.organ.assumptions) {
+    if (assumption.code == kSpacingLawKept) tell_user("tpm: assumed: {}\n", assumption.text);
+  }
 }
 
 /// Of large networks what the first output waits for: until then nothing says how long a run takes.
@@ -224,8 +226,9 @@ int simulate_trajectory(const SimulateChoice& choice, const ExperimentScene& sce
   const std::vector<double> times = times_to_watch(scene);
   const Trajectory answer = run_scene(scene, times, scene.formulation.entry().can().field);
   write_scene_run(scene, times, answer, choice.output);
-  say_with_files(session, with_spacing_law(scene_run_json(scene, times, answer), scene, session),
+  say_with_files(session, with_spacing_law(scene_run_json(scene, times, answer), scene),
                  scene_run_text(scene, times, answer), {choice.output});
+  tell_spacing_law(scene, session);
   return 0;
 }
 
@@ -272,14 +275,15 @@ int simulate_and_report(const SimulateChoice& choice, const Session& session) {
       add_beside(answer, short_answer(s.scene, s.network, s.run));
     }
   }
-  json = with_spacing_law(std::move(json), all.front().scene, session);
   if (session.json() || choice.verbose) {
-    say_with_files(session, std::move(json), text, files);
+    say_with_files(session, with_spacing_law(std::move(json), all.front().scene), text, files);
+    tell_spacing_law(all.front().scene, session);
     return 0;
   }
   answer.end.push_back(fmt::format("wrote {}", fmt::join(files, ", ")));
   end_answer(answer, "", {}, "tpm view " + shell_word(choice.output));
   say("{}", to_text(answer));
+  tell_spacing_law(all.front().scene, session);
   return 0;
 }
 
@@ -308,18 +312,18 @@ int simulate_planned(const SimulateChoice& choice, const Session& session) {
   const std::vector<double> times = times_to_watch(scene);
   const Trajectory answer = run_planned(plan, scene, times);
   write_planned_run(plan, scene, times, answer, choice.output);
-  const Json result =
-      with_spacing_law(planned_run_json(plan, scene, times, answer), scene, session);
   if (session.json() || choice.verbose) {
     // Verbose: also which candidates were considered, and what the plan says of them.
-    say_with_files(session, result, plan_text(plan) + "\n" + planned_run_text(plan, times, answer),
-                   {choice.output});
+    say_with_files(session, with_spacing_law(planned_run_json(plan, scene, times, answer), scene),
+                   plan_text(plan) + "\n" + planned_run_text(plan, times, answer), {choice.output});
+    tell_spacing_law(scene, session);
     return 0;
   }
   ShortAnswer brief = short_answer(plan, times, answer);
   brief.end.push_back(fmt::format("wrote {}", choice.output));
   end_answer(brief, "", {}, "tpm view " + shell_word(choice.output));
   say("{}", to_text(brief));
+  tell_spacing_law(scene, session);
   return 0;
 }
 
