@@ -274,7 +274,7 @@ Eigen::VectorXd bias_of_drive_noise(const ExperimentResiduals& function, const E
   constexpr double kMatters = 0.25;  // standard errors
   const std::vector<Eigen::Index> columns(free.begin(), free.end());
   const auto here = function.drive_noise_slope(natural);
-  const Eigen::VectorXd none = Eigen::VectorXd::Zero(estimates.length().size());
+  Eigen::VectorXd none = Eigen::VectorXd::Zero(estimates.length().size());
   if (!here) return none;
   const Eigen::VectorXd moved = estimates.moved_by((*here)(columns));
   const Eigen::ArrayXd error = (variance * estimates.plain_variance()).array().sqrt();

@@ -261,7 +261,7 @@ TrianglePoint TriangleTree::nearest_of_moved(const Vector3d& point, double withi
       return *found;
     }
   }
-  const TrianglePoint found = nearest_beside(point, within, near.part);
+  TrianglePoint found = nearest_beside(point, within, near.part);
   near.part = found.triangle;
   // A list that reaches on is kept: on an edge rounding would have decided.
   if (!(2.0 * moved < near.reach)) list(point, moved, found, near);
