@@ -332,7 +332,8 @@ TEST_CASE("the ends of all starts are told") {
   CHECK(fit.waterfall.deviances.front() == fit.best.deviance);
   const Json j = to_json(fit);
   CHECK(j["starts"]["end_deviances"].size() == 8);
-  CHECK_THAT(j["starts"]["summary"].get<std::string>(), Contains("of 8 starts end at the best minimum"));
+  CHECK_THAT(j["starts"]["summary"].get<std::string>(),
+             Contains("of 8 starts end at the best minimum"));
 }
 
 // --- data that cannot tell -----------------------------------------------------------------------
