@@ -359,7 +359,7 @@ std::string adequacy_words(const SpecimenStudy& study) {
   say("not_described",
       "no law tried describes them; what is pooled supposes that the law described them");
   say("not_judged",
-      "adequacy cannot be judged: too few samples at rest before the load to tell the noise");
+      "adequacy cannot be judged: the readings before the load are too few, or not at rest");
   return text;
 }
 
