@@ -154,7 +154,7 @@ std::vector<NeighbourPair> pairs_within(const Positions& points, double radius) 
 }
 
 const std::vector<NeighbourPair>& NearPairs::of(const Positions& points) {
-  constexpr double kMargin = 0.25;  // of the reach
+  constexpr double kMargin = 0.5;  // of the reach
   const double margin = kMargin * reach_;
   if (points_.cols() == 0 ||
       (points - points_).colwise().squaredNorm().maxCoeff() > 0.25 * margin * margin) {
