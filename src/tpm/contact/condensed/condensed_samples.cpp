@@ -120,11 +120,10 @@ void CondensedSampler::move(State& state, const Eigen::Vector3d& contact,
       throw Error(
           ExitCode::numerical, search.stable ? ErrorCause::snapped_through : ErrorCause::buckled,
           "condensed model",
-          fmt::format("with the contact at {} mm the tissue {}; expected a smaller depth",
+          fmt::format("with the contact at {} mm the tissue {}{}; expected a smaller depth",
                       significant(1e3 * state.contact.norm(), 4),
-                      search.stable ? "snaps through"
-                                    : "buckles" + buckling_place(equilibrium_, state.position,
-                                                                 viscous_state, rest_.cols())));
+                      search.stable ? "finds no equilibrium near: it may snap through" : "buckles",
+                      buckling_place(equilibrium_, state.position, viscous_state, rest_.cols())));
     }
   }
 }

@@ -71,9 +71,9 @@ Positions loaded_positions(const BondSystem& bonds, const Positions& rest,
     part *= 0.5;
     if (part >= kLeastPart) continue;
     const std::string fault =
-        unstable ? "buckles" + buckling_place(equilibrium, position, relaxed, position.cols())
-                 : "finds no equilibrium";
-    throw Error(ExitCode::numerical, unstable ? ErrorCause::buckled : ErrorCause::unspecified,
+        (unstable ? "buckles" : "finds no equilibrium near: it may snap through") +
+        buckling_place(equilibrium, position, relaxed, position.cols());
+    throw Error(ExitCode::numerical, unstable ? ErrorCause::buckled : ErrorCause::snapped_through,
                 "loads",
                 fmt::format("at {} % of the loads that stay the tissue {}",
                             significant(100.0 * aim, 3), fault),

@@ -82,11 +82,11 @@ QuasiStaticState StaticPath::move_to(double imposed, double time_s) {
     throw Error(
         ExitCode::numerical, unstable_ ? ErrorCause::buckled : ErrorCause::snapped_through,
         "network",
-        fmt::format(
-            "on the way to t = {} s, at {} of {} {}, the tissue {}", significant(time_s, 5),
-            depth ? "a depth" : "a load", significant((depth ? 1e3 : 1.0) * state_.imposed, 4),
-            depth ? "mm" : "N",
-            unstable_ ? buckling_words(tissue_, state_) : "snaps through: no equilibrium is near"));
+        fmt::format("on the way to t = {} s, at {} of {} {}, the tissue {}", significant(time_s, 5),
+                    depth ? "a depth" : "a load",
+                    significant((depth ? 1e3 : 1.0) * state_.imposed, 4), depth ? "mm" : "N",
+                    unstable_ ? buckling_words(tissue_, state_)
+                              : "finds no equilibrium near" + snap_words(tissue_, state_)));
   }
   const double stored_J = tissue_.bonds().stored_energy_J(state_.position, state_.viscous);
   return {time_s,          state_.imposed, tissue_.response(state_),
