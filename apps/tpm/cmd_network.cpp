@@ -76,7 +76,11 @@ int check(const NetworkChoice& choice, const Session& session) {
   const Tissue tissue = tissue_of(choice);
   std::string fault;
   try {
-    require_standing(tissue, choice.scene.empty() ? "options" : choice.scene);
+    const std::string_view where =
+        choice.scene.empty() ? "options" : std::string_view(choice.scene);
+    require_standing(tissue, where);
+    const bool has_contacts = !choice.scene.empty() && read_json(choice.scene).contains("contacts");
+    if (!has_contacts) require_free_contact(tissue, where);
   } catch (const Error& error) {
     if (error.code() != ExitCode::bad_input) throw;
     fault = error.what();

@@ -1,9 +1,12 @@
 // Scenes: what is read from them, what stands, and the files of a network.
+#include <fmt/format.h>
+
 #include <catch2/catch.hpp>
 #include <cstdlib>
 #include <regex>
 #include <set>
 
+#include "simulated_scene.hpp"
 #include "temp_folder.hpp"
 #include "tpm/files/file.hpp"
 #include "tpm/files/hdf5/hdf5.hpp"
@@ -19,11 +22,12 @@ using Catch::Matchers::Contains;
 using Catch::Matchers::StartsWith;
 using Catch::Matchers::WithinRel;
 using Eigen::Vector3d;
+using test::experiment;
 using test::TempFolder;
 
 namespace {
 
-Tissue tissue_of(const char* scene) {
+Tissue tissue_of(std::string_view scene) {
   return parse_tissue(parse_json(scene, "scene"), "scene", {});
 }
 
@@ -140,6 +144,23 @@ TEST_CASE("a load must be able to move its sphere") {
                     Contains("square to its guide"));
   CHECK_THROWS_WITH(require_loadable(tissue, 4, Vector3d::UnitX(), "contacts/0"),
                     Contains("no sphere 5"));
+}
+
+TEST_CASE("an anchored contact sphere refuses only scenes that push it") {
+  const std::string liver = R"({"organ": {"kind": "liver", "count": 60})";
+  const std::size_t contact = tissue_of(liver + "}").network.organ.contact.value() + 1;
+  const std::string anchored =
+      liver + R"(, "anchors": [{"kind": "spheres", "spheres": [)" + std::to_string(contact) +
+      R"(]}, {"kind": "inner_layer"}], "protocol": {"kind": "ramp_hold", "depth": "1 mm",
+         "rate": "4 mm/s", "hold": "1 s"})";
+  const std::string is_anchored = fmt::format("sphere {}, which is anchored", contact);
+  const Tissue tissue = tissue_of(anchored + "}");
+  CHECK_NOTHROW(require_standing(tissue, "scene"));
+  CHECK_THROWS_WITH(require_free_contact(tissue, "scene"), Contains("is anchored"));
+  CHECK_THROWS_WITH(experiment(anchored + "}"), Contains(is_anchored));
+  const std::string other = fmt::format(R"(, "contacts": [{{"kind": "sphere", "number": {}}}]}})",
+                                        contact == 1 ? 2 : contact - 1);
+  CHECK_NOTHROW(experiment(anchored + other));
 }
 
 TEST_CASE("an organ that nothing holds has the six motions of a rigid body") {

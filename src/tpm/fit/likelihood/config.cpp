@@ -30,6 +30,7 @@ LawSpec law_of(const StatedLaw& stated) {
 std::shared_ptr<const Tissue> organ_of(const std::filesystem::path& scene) {
   auto tissue = std::make_shared<Tissue>(read_tissue(scene));
   require_standing(*tissue, scene.string());
+  require_free_contact(*tissue, scene.string());
   return tissue;
 }
 

@@ -42,6 +42,7 @@ SceneOrgan organ_of_scene(const Json& scene, std::string_view where,
   for (const char* key : {"contacts", "protocol", "formulation", "outputs"}) bare.erase(key);
   auto tissue = std::make_shared<Tissue>(parse_tissue(bare, where, folder));
   require_standing(*tissue, where);
+  if (!probe) require_free_contact(*tissue, where);
   Organ& organ = tissue->network.organ;
   if (probe) {
     organ.contact = probe->sphere;

@@ -43,6 +43,7 @@ PushedScene::PushedScene(const HilSession& session)
       tissue(parse_tissue(session.scene, session.scene_place, {})),
       deepest_m(deepest_of(session)) {
   require_standing(tissue, session.scene_place);
+  if (session.contact.is_null()) require_free_contact(tissue, session.scene_place);
   contact = moved_contact(session, tissue);
 }
 

@@ -272,11 +272,15 @@ void require_standing(const Tissue& tissue, std::string_view where) {
     throw bad_input(where, fmt::format("not anchored: {}", modes),
                     "anchors that hold the organ, such as [{\"kind\": \"inner_layer\"}]");
   }
-  if (organ.contact && is_anchored(tissue, *organ.contact)) {
-    throw bad_input(where, fmt::format("the contact sphere {} is anchored", *organ.contact + 1),
+  require_sound(tissue, where, {});
+}
+
+void require_free_contact(const Tissue& tissue, std::string_view where) {
+  const std::optional<std::size_t>& contact = tissue.network.organ.contact;
+  if (contact && is_anchored(tissue, *contact)) {
+    throw bad_input(where, fmt::format("the contact sphere {} is anchored", *contact + 1),
                     "anchors that leave it free");
   }
-  require_sound(tissue, where, {});
 }
 
 void require_sound(const Tissue& tissue, std::string_view where) {

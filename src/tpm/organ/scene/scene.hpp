@@ -67,9 +67,12 @@ struct Tissue {
 /// read_json and parse_tissue.
 [[nodiscard]] Tissue read_tissue(const std::filesystem::path& scene);
 
-/// Throws Error(bad_input) unless the network stands: something is anchored, the contact sphere is
-/// not, and the network is sound.
+/// Throws Error(bad_input) unless the network stands: something is anchored, and it is sound.
 void require_standing(const Tissue& tissue, std::string_view where);
+
+/// Throws Error(bad_input) if the organ's own contact sphere is anchored. A scene whose contacts
+/// are others does not ask.
+void require_free_contact(const Tissue& tissue, std::string_view where);
 
 /// Throws Error(bad_input) unless bonds hold every sphere (outer_support.hpp), no motion but those
 /// of the whole body is free of energy (not looked for above kMostSpheresForModes spheres), and no
