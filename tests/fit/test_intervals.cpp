@@ -5,6 +5,7 @@
 #include <catch2/catch.hpp>
 #include <cmath>
 
+#include "support/placed_recordings.hpp"
 #include "support/remarks.hpp"
 #include "tpm/base/random.hpp"
 #include "tpm/fit/autoregressive.hpp"
@@ -99,6 +100,82 @@ TEST_CASE("correlated noise: the covariance of least squares agrees with dense m
   CHECK_THAT(noise.inflation, WithinRel(r.sum() / static_cast<double>(r.rows()), 1e-9));
   CHECK(test::has_remark(fit.remarks, "correlated_noise"));
   CHECK(to_json(fit)["noise_of_estimates"]["parameters"].size() == fit.parameters.size());
+}
+
+TEST_CASE("noise that goes on from a rest into the fit is counted with its priors", "[intervals]") {
+  test::PlacedTest made;
+  made.rest_s = made.after_s = 4.0;
+  made.ramp_s = 1.0;
+  made.hold_s = 20.0;
+  made.start_m = -2e-3;
+  made.step_s = 0.1;
+  made.phi = 0.9;
+  made.noise_N = 1e-3;
+  const std::vector<PreparedRecording> one{test::prepared(made, 5)};
+  SetupOptions setup;
+  setup.profiles = false;
+  setup.reference = made.reference_m;
+  const FitConfig config = recording_config(test::spec_of(made), one, setup);
+  const ExperimentResiduals declared(config, data_sets(one));
+  const FitResult fit = fit_experiments(declared);
+  const auto function = declared.copy();
+  const double weight = std::sqrt(fit.inflation * fit.variance_factor);
+  function->set_prior_weight(weight);
+  const std::vector<FitParameter> parameters = searched_parameters(fit.config);
+  const auto noise = noise_of_estimates(*function, parameters, fit.best.natural);
+  REQUIRE(noise);
+  REQUIRE(noise->correlated);
+  REQUIRE(noise->free.size() == parameters.size());
+  Eigen::VectorXd residual;
+  RowMatrix jacobian;
+  REQUIRE(function->evaluate(fit.best.natural, residual, &jacobian));
+  const Eigen::Index values = function->value_count(), n = residual.size();
+  REQUIRE(n == values + 3);  // zero, contact, drift
+  // Covariance of all residuals, those of the priors last.
+  Eigen::MatrixXd c = Eigen::MatrixXd::Zero(n, n);
+  const double variance = noise->variance * noise->beyond;
+  for (Eigen::Index a = 0; a < values; ++a) {
+    for (Eigen::Index b = 0; b < values; ++b) {
+      c(a, b) = variance * std::pow(noise->phi, static_cast<double>(std::abs(a - b)));
+    }
+  }
+  c.bottomRightCorner(3, 3).diagonal().setConstant(weight * weight);
+  const Eigen::MatrixXd j = jacobian;
+  const Eigen::MatrixXd to = (j.transpose() * j).inverse() * j.transpose();
+  const Eigen::MatrixXd apart = to * c * to.transpose();
+  std::size_t contact = 0;
+  Eigen::Index prior = values;
+  const auto drift = std::ranges::find_if(
+      config.parameters, [](const EstimatedParameter& p) { return p.drift.has_value(); });
+  REQUIRE(drift != config.parameters.end());
+  const FitDatum& first = *std::ranges::find(function->data(), false, &FitDatum::held_out);
+  const double sigma = first.sigma;
+  const double away_s = first.time_s - made.step_s - drift->drift->origin_s;
+  const auto zero = std::ranges::find_if(
+      config.parameters, [](const EstimatedParameter& p) { return p.fit.name == "offset"; });
+  const double line =
+      std::pow(zero->prior.value().sd, 2) + std::pow(drift->prior.value().sd * away_s, 2);
+  const double share = std::min(1.0, variance * sigma * sigma / line);
+  for (std::size_t i = 0; i < config.parameters.size(); ++i) {
+    const EstimatedParameter& p = config.parameters[i];
+    if (p.fit.name == "contact") contact = i;
+    if (!p.prior) continue;
+    const double by = p.drift ? away_s : p.fit.name == "offset" ? 1.0 : 0.0;
+    for (Eigen::Index a = 0; a < values; ++a) {
+      c(a, prior) = weight * p.prior->sd * by * share / sigma *
+                    std::pow(noise->phi, static_cast<double>(a + 1));
+      c(prior, a) = c(a, prior);
+    }
+    ++prior;
+  }
+  const Eigen::MatrixXd expected = to * c * to.transpose();
+  for (Eigen::Index k = 0; k < expected.rows(); ++k) {
+    CAPTURE(parameters[static_cast<std::size_t>(k)].name);
+    CHECK_THAT(noise->covariance(k, k), WithinRel(expected(k, k), 1e-6));
+  }
+  // Contact is where the readings leave the line of the rest, whose noise they share.
+  const auto at = static_cast<Eigen::Index>(contact);
+  CHECK(noise->covariance(at, at) < 0.7 * apart(at, at));
 }
 
 TEST_CASE("white noise keeps its exact intervals", "[intervals]") {

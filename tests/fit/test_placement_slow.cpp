@@ -27,8 +27,9 @@ TEST_CASE("intervals with the prior of a drift hold the true value in 93 to 97 %
 }
 
 TEST_CASE("a drift that is told by chance is not stated too exactly", "[placement]") {
-  // Whether the rests tell a drift depends on the estimated noise: with a correlation of 0.9 they
-  // do in about half of the sets, in which that estimate is small.
+  // Whether the rests tell a drift depends on the estimated noise: of what is stated for a
+  // correlation of 0.9, by every phi that the readings leave possible, half would be told, those
+  // whose estimate is small. The most likely phi tells most of them.
   PlacedTest made;
   made.rest_s = made.after_s = 4.0;
   made.ramp_s = 1.0;
@@ -42,7 +43,7 @@ TEST_CASE("a drift that is told by chance is not stated too exactly", "[placemen
   for (const double phi : {0.0, 0.9}) {
     made.phi = phi;
     Random random(17);
-    int told = 0, held = 0, wider = 0;
+    int told = 0, held = 0;
     for (int i = 0; i < kSets; ++i) {
       const PreparedRecording r = prepare_recording("made", test::measured(made, clean, random));
       const MeasuredPlacement placement = measure_placement(r, spec_of(made), {});
@@ -50,12 +51,10 @@ TEST_CASE("a drift that is told by chance is not stated too exactly", "[placemen
       const Measured& drift = placement.rests.drift.value();
       ++told;
       held += std::abs(drift.value - made.drift_N_per_s) <= 1.96 * drift.sd;
-      wider += drift.sd > read_rests(r).drift.value().sd;
     }
-    INFO("phi " << phi << ": held in " << held << " of " << told << ", wider in " << wider);
-    CHECK(told >= (phi == 0.0 ? kSets : kSets / 4));
-    CHECK((wider == 0) == (phi == 0.0));
-    CHECK(held >= 0.915 * told);
-    CHECK(held <= 0.985 * told);
+    INFO("phi " << phi << ": held in " << held << " of " << told);
+    CHECK(told >= (phi == 0.0 ? kSets : 3 * kSets / 4));
+    CHECK(held >= 0.926 * told);
+    CHECK(held <= 0.971 * told);
   }
 }

@@ -1,9 +1,11 @@
 // What readings at rest tell of zero and drift, whatever their correlation.
+#include <Eigen/LU>
 #include <catch2/catch.hpp>
 #include <cmath>
 
 #include "tpm/base/random.hpp"
 #include "tpm/fit/autoregressive.hpp"
+#include "tpm/fit/measured_at_rest.hpp"
 #include "tpm/fit/recording/rest_line.hpp"
 
 using namespace tpm;
@@ -76,4 +78,50 @@ TEST_CASE("zero and drift of correlated rests are held in 93 to 97 %", "[placeme
     CHECK(drift >= kFewest);
     CHECK(drift <= kMost);
   }
+}
+
+TEST_CASE("the noise of a rest goes on behind it as generalised least squares say", "[placement]") {
+  constexpr double kPhi = 0.9, kStep_s = 0.1, kLast_s = 3.9, kVariance = 2.0;
+  const std::vector<double> time_s = rest_times_s();
+  const auto n = std::ssize(time_s);
+  const auto correlation = [](double a, double b) {
+    return std::pow(kPhi, std::abs(a - b) / kStep_s);
+  };
+  Eigen::MatrixXd r(n, n), line(n, 2);
+  for (Eigen::Index i = 0; i < n; ++i) {
+    const double t = time_s[static_cast<std::size_t>(i)];
+    line.row(i) << 1.0, t;
+    for (Eigen::Index k = 0; k < n; ++k)
+      r(i, k) = correlation(t, time_s[static_cast<std::size_t>(k)]);
+  }
+  const Eigen::MatrixXd weights = r.inverse() * line;
+  Eigen::Matrix2d d = (line.transpose() * weights).inverse();
+  const double origin_s = -d(0, 1) / d(1, 1);
+  line.col(1).array() -= origin_s;
+  d = (line.transpose() * r.inverse() * line).inverse();
+  const Eigen::MatrixXd estimate = d * line.transpose() * r.inverse();
+  MeasuredAtRest rest;
+  rest.last_s = kLast_s;
+  rest.origin_s = origin_s;
+  rest.sigma = 4.0;
+  rest.zero_sd = std::sqrt(kVariance * d(0, 0));
+  rest.drift_sd = std::sqrt(kVariance * d(1, 1));
+  const double variance = kVariance / (rest.sigma * rest.sigma);  // of declared ones
+  const Eigen::Vector2d with_last = rest.covariance_with_last(variance);
+  for (const double t : {4.0, 4.5, 6.0}) {
+    Eigen::VectorXd with(n);
+    for (Eigen::Index i = 0; i < n; ++i)
+      with[i] = correlation(t, time_s[static_cast<std::size_t>(i)]);
+    const Eigen::Vector2d exact = kVariance * (estimate * with) / rest.sigma;
+    CAPTURE(t);
+    CHECK_THAT(correlation(t, kLast_s) * with_last[0], WithinRel(exact[0], 1e-5));
+    CHECK_THAT(correlation(t, kLast_s) * with_last[1], WithinRel(exact[1], 1e-5));
+  }
+  // Stated wider than this, they do not say more of the last reading than itself.
+  rest.zero_sd *= 5.0;
+  rest.drift_sd *= 5.0;
+  const Eigen::Vector2d wide = rest.covariance_with_last(variance);
+  const double predicted = rest.sigma * (wide[0] + (kLast_s - origin_s) * wide[1]);
+  CHECK_THAT(predicted, WithinRel(kVariance, 1e-12));
+  CHECK_THAT(wide[1] / wide[0], WithinRel(with_last[1] / with_last[0], 1e-12));
 }

@@ -15,6 +15,7 @@
 #include "tpm/fit/likelihood/correlation.hpp"
 #include "tpm/fit/likelihood/experiment_residuals.hpp"
 #include "tpm/fit/likelihood/quantum.hpp"
+#include "tpm/fit/measured_at_rest.hpp"
 #include "tpmkit/error.hpp"
 
 namespace tpm::fit {
@@ -33,6 +34,7 @@ struct NoiseRows {
   Eigen::VectorXd half_step;         ///< of rounding, in units of the declared noise; of values
   std::vector<double> prior_weight;  ///< of each prior's residual
   std::vector<RecordingRows> recordings;
+  std::vector<std::optional<MeasuredAtRest>> at_rest;  ///< of each recording
   double step_s = 0.0;
 
   [[nodiscard]] Eigen::Index priors() const { return std::ssize(prior_weight); }
@@ -120,6 +122,10 @@ std::optional<NoiseRows> noise_rows(const ExperimentResiduals& function,
   }
   if (std::ranges::any_of(distances, [](double d) { return !(d > 0.0); })) return std::nullopt;
   rows.step_s = median_of(distances);
+  for (const Experiment& experiment : function.experiments()) {
+    if (!experiment.is_recording) continue;
+    rows.at_rest.push_back(measured_at_rest(function, experiment, rows.step_s));
+  }
   const Eigen::Index values = std::ssize(kept);
   for (; row < residual.size(); ++row) kept.push_back(row);
   for (const EstimatedParameter& p : function.config().parameters) {
@@ -196,6 +202,29 @@ class Estimates {
     return bread_ * (j.transpose() * r) * bread_;
   }
   [[nodiscard]] const Eigen::MatrixXd& by_priors() const { return from_priors_; }
+  /// Covariance by what the noise of a rest did to both its priors and the readings behind it.
+  /// @param variance of a reading, in units of the declared one
+  [[nodiscard]] Eigen::MatrixXd by_rests(double phi, double variance) const {
+    const AutoregressiveNoise noise(phi, rows_.step_s);
+    Eigen::MatrixXd sum = Eigen::MatrixXd::Zero(bread_.rows(), bread_.cols());
+    for (std::size_t k = 0; k < rows_.at_rest.size(); ++k) {
+      if (!rows_.at_rest[k] || rows_.recordings[k].count == 0) continue;
+      const MeasuredAtRest& rest = *rows_.at_rest[k];
+      const RecordingRows& fitted = rows_.recordings[k];
+      const double begin_s = rows_.time_s[static_cast<std::size_t>(fitted.first)];
+      Eigen::RowVectorXd follows = Eigen::RowVectorXd::Zero(bread_.rows());
+      for (Eigen::Index i = fitted.first; i < fitted.first + fitted.count; ++i) {
+        const double after_s = rows_.time_s[static_cast<std::size_t>(i)] - begin_s;
+        follows += noise.correlation(after_s + rows_.step_s) * scaled_.row(i);
+      }
+      const Eigen::Vector2d with_last = rest.covariance_with_last(variance);
+      const Eigen::MatrixXd both =
+          follows.transpose() * (with_last[0] * prior_score(rest.zero_prior, rest.zero_sd) +
+                                 with_last[1] * prior_score(rest.drift_prior, rest.drift_sd));
+      sum += both + both.transpose();
+    }
+    return bread_ * sum * bread_;
+  }
   /// For independent readings of variance 1, all residuals counted alike.
   [[nodiscard]] Eigen::VectorXd plain_variance() const { return bread_.diagonal(); }
   /// sum of |d estimate / d reading| times what each reading may be off.
@@ -210,6 +239,12 @@ class Estimates {
   [[nodiscard]] const Eigen::VectorXd& length() const { return length_; }
 
  private:
+  /// What an error of a prior's mean adds to the slope of half the sum of squares.
+  [[nodiscard]] Eigen::RowVectorXd prior_score(std::size_t prior, double sd) const {
+    const Eigen::Index row = rows_.values() + static_cast<Eigen::Index>(prior);
+    return rows_.prior_weight[prior] / sd * scaled_.row(row);
+  }
+
   const NoiseRows& rows_;
   Eigen::VectorXd length_;
   Eigen::MatrixXd scaled_, bread_, from_priors_;
@@ -388,15 +423,18 @@ std::optional<NoiseOfEstimates> noise_of_estimates(const ExperimentResiduals& fu
 
   const double size = noise.variance * noise.beyond;
   const Eigen::MatrixXd readings = size * estimates.by_readings(noise.phi);
-  const Eigen::MatrixXd all = readings + estimates.by_priors();
+  const Eigen::MatrixXd all =
+      readings + estimates.by_priors() + estimates.by_rests(noise.phi, size);
   const Eigen::VectorXd unscaled = estimates.length().cwiseInverse();
   noise.covariance = unscaled.asDiagonal() * all * unscaled.asDiagonal();
   // Derivatives of ln(variance) by phi, and by the size of the noise.
   const double step = 0.02 * (1.0 - noise.phi) + 1e-6;
   const double below = std::max(noise.phi - step, 0.0), above = noise.phi + step;
   const Eigen::VectorXd slope =
-      size / (above - below) *
-          (estimates.by_readings(above) - estimates.by_readings(below)).diagonal() +
+      1.0 / (above - below) *
+          (size * (estimates.by_readings(above) - estimates.by_readings(below)) +
+           estimates.by_rests(above, size) - estimates.by_rests(below, size))
+              .diagonal() +
       (scale_known ? 0.0 : found.log_squares_slope) * readings.diagonal();
   const Eigen::VectorXd plain = estimates.plain_variance();
   const Eigen::VectorXd bias = estimates.largest_bias(off) + bias_of_drive;

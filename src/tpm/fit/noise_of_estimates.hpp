@@ -28,8 +28,10 @@ struct NoiseOfEstimate {
 ///
 ///     (J'J + P)^-1 (s^2 J'R(phi)J + Q) (J'J + P)^-1,
 ///
-/// P and Q from priors. An estimate that follows fast changes suffers less from slow noise than a
-/// plateau does: each has its own variance and its own degrees of freedom (Satterthwaite).
+/// P and Q from priors, and, where the rests of a recording gave its zero and its drift, from the
+/// correlation of the rest before contact with the readings behind it. An estimate that follows
+/// fast changes suffers less from slow noise than a plateau does: each has its own variance and its
+/// own degrees of freedom (Satterthwaite).
 struct NoiseOfEstimates {
   double phi = 0.0;        ///< correlation of samples step_s apart
   double step_s = 0.0;     ///< median distance of samples

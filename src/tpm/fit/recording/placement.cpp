@@ -233,6 +233,7 @@ void fit_rests(const RestSamples& rest, double rounding, const std::optional<Hol
   result.origin_s = line.origin_s;
   result.zero = line.zero;
   result.drift = line.slope;
+  result.likely_drift_sd = line.likely_slope_sd;
   estimate.zero_limit = line.zero_limit;
   estimate.drift_limit = line.slope_limit;
 }
@@ -283,6 +284,7 @@ RestEstimate estimate_rests(const PreparedRecording& recording) {
   result.zero = Measured{level, constant ? rounding : noise / std::sqrt(n)};
   if (constant && rest.reading.size() >= kFewestForSlope) {
     result.drift = Measured{0.0, std::sqrt(12.0) * rounding / length};
+    result.likely_drift_sd = result.drift->sd;
   }
   return estimate;
 }
@@ -352,7 +354,8 @@ std::optional<LevelBeforeLoad> level_before_load(const PreparedRecording& r) {
 DriftFinding drift_finding(const PreparedRecording& r, const RestReadings& rests) {
   const auto most = most_drift_sd(r, rests);
   if (!most) return DriftFinding::no_hold;
-  return rests.drift && rests.drift->sd <= *most ? DriftFinding::told : DriftFinding::not_separable;
+  const bool told = rests.drift && rests.likely_drift_sd <= *most;
+  return told ? DriftFinding::told : DriftFinding::not_separable;
 }
 
 MeasuredPlacement measure_placement(const PreparedRecording& recording, const LawSpec& law,

@@ -27,6 +27,7 @@ struct RestReadings {
   std::optional<Measured> zero;       ///< of the response, at origin_s; none without samples before
                                       ///< contact
   std::optional<Measured> drift;      ///< of the zero, per second; none below 8 samples
+  double likely_drift_sd = 0.0;       ///< of the drift at the most likely phi
   bool pulled = false;                ///< after withdrawal (is_pulled_after): `after` is 0
 };
 
@@ -91,7 +92,10 @@ enum class DriftFinding {
                   ///< there is no rest
 };
 
-/// @return told only if the uncertainty of the slope times the time from contact to the end of
+/// The uncertainty at the most likely phi decides, and not the stated one, which counts every phi
+/// that the readings leave possible: it is larger, the less is known of phi, and recordings whose
+/// correlation seems small by chance would be told and the others not.
+/// @return told only if that uncertainty of the slope times the time from contact to the end of
 ///         the longest hold is at most 2 % of the force there
 [[nodiscard]] DriftFinding drift_finding(const PreparedRecording& recording,
                                          const RestReadings& rests);
@@ -104,9 +108,9 @@ struct MeasuredPlacement {
 };
 
 /// The finding about a drift depends on the estimated noise. Rests whose noise seems small by
-/// chance tell it more often, so that the intervals of what is told would hold it too seldom (87 to
-/// 90 % where half of the recordings are told: reports/fits). Where the standard deviation at the
-/// upper end of the 95 % interval of the noise would not tell it, zero and drift have that one.
+/// chance tell it more often. Where the correlation is not significant and the standard deviation
+/// at the upper end of the 95 % interval of the noise would not tell it, zero and drift have that
+/// one. Intervals that count every possible phi are wide enough.
 [[nodiscard]] MeasuredPlacement measure_placement(const PreparedRecording& recording,
                                                   const LawSpec& law,
                                                   std::optional<double> exponent);

@@ -27,7 +27,9 @@ struct RestLine {
   double origin_s = 0.0;  ///< where zero and slope are uncorrelated
   Measured zero;          ///< at origin_s
   std::optional<Measured> slope;
-  /// Standard deviations at the upper end of the 95 % interval of the noise.
+  double likely_slope_sd = 0.0;  ///< of the slope at phi
+  /// Standard deviations at the upper end of the 95 % interval of the noise; the stated ones where
+  /// these count every phi.
   double zero_limit = 0.0, slope_limit = 0.0;
 };
 
