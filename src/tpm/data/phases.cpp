@@ -37,7 +37,7 @@ void require_usable(const Recording& recording) {
         id,
         fmt::format("holds a {}, without what was imposed",
                     quantity_name(recording.response_quantity)),
-        "a recording of what was imposed and of the response; tpm fit reads this table");
+        "a recording of what was imposed and of the response; tpm fit FILE fits this table alone");
   }
   if (recording.drive.empty()) {
     throw bad_input(id, "the recording does not say what was imposed",
