@@ -239,8 +239,12 @@ std::optional<Remark> prony_remark(const MaterialFunction& function, const FitRe
       step == nullptr || (!sizes.compliance && step->response.front() >= kRise * sizes.largest);
   const double decades = std::log10(sizes.longest_s / sizes.shortest_s);
   if (stated || described || !falls || decades < kLeastDecades) return std::nullopt;
-  const int times = std::min(static_cast<int>(std::lround(decades)) + 1, kMostTimes);
-  if (2 * times > fit.value_count) return std::nullopt;
+  const int whole = static_cast<int>(std::lround(decades));
+  const auto enough = [&](int times) {
+    return times <= kMostTimes && 2 * times <= fit.value_count;
+  };
+  const int times = enough(2 * whole + 1) ? 2 * whole + 1 : whole + 1;
+  if (!enough(times)) return std::nullopt;
   return Remark{"prony_series",
                 fmt::format("{} decades of time: a Prony series on stated times may describe "
                             "them: --times \"{} s : {} s : {}\"",
