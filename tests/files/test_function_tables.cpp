@@ -70,7 +70,7 @@ TEST_CASE("G(t) and J(t) are read with other words beside them") {
 
 TEST_CASE("numbers that are not the readings of G(t) are not taken for them") {
   for (const char* title : {"log G(t)", "G(t) fit", "G(t) lower", "SE G(t)", "normalised G(t)",
-                            "max. G(t)", "G(t)/G0"}) {
+                            "max. G(t)", "G(t)/G0", "deviation of G(t)"}) {
     CAPTURE(title);
     const auto meaning = recognize_title(title);
     CHECK_FALSE((meaning && meaning->quantity == Quantity::relaxation_modulus));

@@ -89,6 +89,8 @@ inline std::vector<ErrorCase> law_cases() {
        with_files({{"l.json", R"({"law": "linear-1", "drive": "strain", "response": "stress",
 "reference": 1, "provenance": "assumed",
 "parameters": {"k_inf_Pa": 20.0, "k1_Pa": 30.0, "tau1_s": 1.5}})"}})},
+      {type, "table of G(t) in a recording's place", "predict {}/l.json {}/g.csv",
+       with_files({{"l.json", kLaw}, {"g.csv", "Time (s),G(t) (Pa)\n0.1,9\n0.2,8\n0.3,7\n"}})},
       {type, "unknown program", "export {}/l.json --to nastran -o {}/out", law(kLaw)},
       {type, "misspelt program", "export {}/l.json --to abaqsu -o {}/out", law(kLaw)},
       {type, "tension in FEBio", to_febio,

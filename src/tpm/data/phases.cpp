@@ -33,11 +33,12 @@ void require_usable(const Recording& recording) {
   if (recording.time_s.empty())
     throw bad_input(id, "the recording has no times", "a time column (--time COLUMN)");
   if (recording.drive.empty() && is_step_response(recording.response_quantity)) {
-    throw bad_input(
-        id,
-        fmt::format("holds a {}, without what was imposed",
-                    quantity_name(recording.response_quantity)),
-        "a recording of what was imposed and of the response; tpm fit FILE fits this table alone");
+    const bool creep = recording.response_quantity == Quantity::creep_compliance;
+    throw bad_input(id,
+                    fmt::format("holds a {}, without what was imposed",
+                                creep ? "creep compliance" : "relaxation modulus"),
+                    "a recording of what was imposed and of the response; tpm fit FILE fits this "
+                    "table alone");
   }
   if (recording.drive.empty()) {
     throw bad_input(id, "the recording does not say what was imposed",

@@ -302,11 +302,12 @@ std::optional<Recognized> function_beside_words(std::string_view name) {
 std::optional<Recognized> unless_other(Recognized function, const std::vector<std::string>& words) {
   if (has_word_of(words, {"sd", "stdev", "stddev"})) return kSd;
   const bool other = has_word_of(
-      words, {"log",        "log10",    "lg",         "ln",       "norm",      "normalized",
-              "normalised", "normiert", "relative",   "ratio",    "lower",     "upper",
-              "ci",         "low",      "high",       "se",       "sem",       "std",
-              "cv",         "fit",      "fitted",     "model",    "predicted", "prediction",
-              "residual",   "calc",     "calculated", "smoothed", "theory",    "simulated"});
+      words,
+      {"log",      "log10",       "lg",         "ln",       "norm",   "normalized", "normalised",
+       "normiert", "relative",    "ratio",      "lower",    "upper",  "ci",         "low",
+       "high",     "se",          "sem",        "std",      "cv",     "fit",        "fitted",
+       "model",    "predicted",   "prediction", "residual", "calc",   "calculated", "smoothed",
+       "sigma",    "uncertainty", "deviation",  "variance", "theory", "simulated"});
   if (other || find_refused_word(words)) return std::nullopt;
   function.rank += 1;  // a title of nothing else says more
   return function;

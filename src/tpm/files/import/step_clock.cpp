@@ -165,9 +165,8 @@ void leave_out_zero_at_step(ImportedSeries& series) {
   const std::size_t rows = time->values.size();
   for (ImportedColumn& column : series.columns) keep_rows(column.values, 1, rows);
   keep_rows(series.lines, 1, rows);
-  series.findings.push_back(ImportFinding::told_of(
-      "left out", fmt::format("the {} of 0 at 0 s, which is from before the step",
-                              quantity_name(answer->quantity))));
+  series.findings.push_back(
+      ImportFinding::told_of("left out", "the reading of 0 at 0 s, which is from before the step"));
 }
 
 bool counts_from_step(const std::vector<double>& times) {
