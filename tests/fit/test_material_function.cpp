@@ -176,6 +176,23 @@ TEST_CASE("A master curve that no law of the family describes names the Prony se
   CHECK(named().empty());
 }
 
+TEST_CASE("A fluid in a solvent is not told to be a Prony series") {
+  // A branch beside a dashpot: the law of two branches is named, whose times are no series.
+  const test::TempFolder folder;
+  std::string text = "omega [rad/s],G' [Pa],G'' [Pa]\n";
+  for (const double omega : decades_of(0.1, 300.0, 22)) {
+    const double x = 0.5 * omega, g = 300.0 * x / (1.0 + x * x);
+    text += fmt::format("{:.17g},{:.17g},{:.17g}\n", omega, g * x, g + 0.4 * omega);
+  }
+  write_file(folder / "g.csv", text);
+  SelectionOptions options = quick();
+  options.setup.profiles = false;
+  const Selection s = select_law(read_function(folder / "g.csv"), options);
+  REQUIRE(s.preferred);
+  CHECK(law_name(s.candidates[*s.preferred].law) == "linear-2-fluid");
+  CHECK(std::ranges::find(s.remarks, "prony_series", &Remark::code) == s.remarks.end());
+}
+
 TEST_CASE("A relaxation modulus that falls by a power of time is fitted by a spring-pot") {
   constexpr double kSize = 500.0, kOrder = 0.3;
   const test::TempFolder folder;

@@ -429,9 +429,8 @@ Selection select_law(const MaterialFunction& function, const SelectionOptions& o
   state_scatter(s);
   const Candidate& chosen = s.candidates[s.recommended];
   s.remarks = range_remarks(chosen.fit, sizes_of_function(function));
-  if (auto remark = prony_remark(function, chosen.fit, options)) {
-    s.remarks.push_back(*std::move(remark));
-  }
+  auto prony = s.preferred ? std::nullopt : prony_remark(function, chosen.fit, options);
+  if (prony) s.remarks.push_back(*std::move(prony));
   if (standing) {
     const Unit unit = shown_unit(quantity_dimension(chosen.fit.data.front().datum.quantity));
     s.remarks.push_back(
