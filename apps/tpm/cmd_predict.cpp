@@ -49,6 +49,15 @@ PredictionOptions prediction_options(const PredictOptions& options) {
   return chosen;
 }
 
+/// Depths in m would be taken for strains or relative lengths.
+void require_law_of_depth(const LawFile& law, const std::string& file) {
+  if (law.spec.drive == Quantity::indentation_depth) return;
+  throw bad_input(file,
+                  fmt::format("a law of {}, which no protocol of depths or loads imposes",
+                              quantity_name(law.spec.drive)),
+                  "--frequencies, or a recording of the motion");
+}
+
 /// That of a law, or of an organ that stands for it.
 LawPrediction answer_of(const std::string& subject, const std::optional<ProtocolFile>& file,
                         const std::optional<PreparedRecording>& recording,
@@ -59,6 +68,7 @@ LawPrediction answer_of(const std::string& subject, const std::optional<Protocol
                 : predict_organ(organ, *recording, options);
   }
   const LawFile law = read_law(subject);
+  if (file) require_law_of_depth(law, subject);
   return file ? predict_law(law, file->protocol, file->times_s, options)
               : predict_recording(law, *recording, options);
 }

@@ -362,6 +362,9 @@ TEST_CASE("what cannot be cut into phases is refused") {
   none = recording;
   none.drive.clear();
   CHECK_THROWS_WITH(find_phases(none), Catch::Contains("does not say what was imposed"));
+  none.response_quantity = Quantity::relaxation_modulus;
+  CHECK_THROWS_WITH(find_phases(none), Catch::Contains("holds a relaxation modulus, without what "
+                                                       "was imposed"));
   recording.response[5] = std::nan("");
   CHECK_THROWS_WITH(find_phases(recording),
                     Catch::Contains("the response holds a value that is not"));

@@ -149,6 +149,50 @@ TEST_CASE("A relaxation modulus that falls by more decades than an instrument re
   CHECK(again.remarks.front() == s.remarks.front());
 }
 
+TEST_CASE("A master curve that no law of the family describes names the Prony series that may") {
+  const test::TempFolder folder;
+  std::string text = "time [s],E(t) [MPa]\n";
+  for (const double t : decades_of(1e-6, 1e3, 73)) {
+    double e = 5.0, tau = 1e-5;
+    for (const double k : {300.0, 250.0, 200.0, 120.0, 60.0, 30.0, 12.0, 6.0, 2.0}) {
+      e += k * std::exp(-t / tau);
+      tau *= 10.0;
+    }
+    text += fmt::format("{:.17g},{:.17g}\n", t, e);
+  }
+  write_file(folder / "e.csv", text);
+  const MaterialFunction function = read_function(folder / "e.csv");
+  SelectionOptions options = quick();
+  options.setup.profiles = false;
+  const auto named = [&] {
+    const Selection s = select_law(function, options);
+    const auto remark = std::ranges::find(s.remarks, "prony_series", &Remark::code);
+    return remark == s.remarks.end() ? std::string() : remark->text;
+  };
+  CHECK_THAT(named(), Contains("--times \"1e-06 s : 1e+03 s : 19\""));
+  // A law that was asked for is not argued with.
+  options.laws = {parse_law_name("linear-1", "test")};
+  options.only_listed = true;
+  CHECK(named().empty());
+}
+
+TEST_CASE("A fluid in a solvent is not told to be a Prony series") {
+  // A branch beside a dashpot: the law of two branches is named, whose times are no series.
+  const test::TempFolder folder;
+  std::string text = "omega [rad/s],G' [Pa],G'' [Pa]\n";
+  for (const double omega : decades_of(0.1, 300.0, 22)) {
+    const double x = 0.5 * omega, g = 300.0 * x / (1.0 + x * x);
+    text += fmt::format("{:.17g},{:.17g},{:.17g}\n", omega, g * x, g + 0.4 * omega);
+  }
+  write_file(folder / "g.csv", text);
+  SelectionOptions options = quick();
+  options.setup.profiles = false;
+  const Selection s = select_law(read_function(folder / "g.csv"), options);
+  REQUIRE(s.preferred);
+  CHECK(law_name(s.candidates[*s.preferred].law) == "linear-2-fluid");
+  CHECK(std::ranges::find(s.remarks, "prony_series", &Remark::code) == s.remarks.end());
+}
+
 TEST_CASE("A relaxation modulus that falls by a power of time is fitted by a spring-pot") {
   constexpr double kSize = 500.0, kOrder = 0.3;
   const test::TempFolder folder;

@@ -32,6 +32,14 @@ void require_usable(const Recording& recording) {
   const std::size_t size = recording.response.size();
   if (recording.time_s.empty())
     throw bad_input(id, "the recording has no times", "a time column (--time COLUMN)");
+  if (recording.drive.empty() && is_step_response(recording.response_quantity)) {
+    const bool creep = recording.response_quantity == Quantity::creep_compliance;
+    throw bad_input(id,
+                    fmt::format("holds a {}, without what was imposed",
+                                creep ? "creep compliance" : "relaxation modulus"),
+                    "a recording of what was imposed and of the response; tpm fit FILE fits this "
+                    "table alone");
+  }
   if (recording.drive.empty()) {
     throw bad_input(id, "the recording does not say what was imposed",
                     "a column of the depth or relative length (--drive COLUMN)");

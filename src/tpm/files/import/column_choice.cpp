@@ -80,9 +80,10 @@ void ColumnChoice::count_specimens() {
   }
 }
 
-std::string ColumnChoice::list() const {
+std::string ColumnChoice::list(std::initializer_list<const MachineColumn*> without) const {
   std::string list;
   for (const MachineColumn& column : header_.columns) {
+    if (std::ranges::find(without, &column) != without.end()) continue;
     list += fmt::format("{}{}", list.empty() ? "" : ", ", column.label());
   }
   return printable(list, 200);

@@ -1,5 +1,6 @@
 #pragma once
 #include <functional>
+#include <initializer_list>
 #include <string>
 #include <vector>
 
@@ -35,7 +36,8 @@ class ColumnChoice {
   void require_column_for_unit(const std::string& selector) const;
 
   /// "column 1 'Time', column 2 'Force'"
-  [[nodiscard]] std::string list() const;
+  /// @param without left out, null or not
+  [[nodiscard]] std::string list(std::initializer_list<const MachineColumn*> without = {}) const;
 
   /// Number of specimens side by side, 1 or more.
   [[nodiscard]] std::size_t specimens() const noexcept { return specimens_; }

@@ -99,7 +99,10 @@ std::optional<ColumnTitle> split_symbol(std::string_view title) {
   const char symbol = title.front();
   const bool letter = (symbol >= 'a' && symbol <= 'z') || (symbol >= 'A' && symbol <= 'Z');
   const std::string unit = written_unit(trimmed(title.substr(2)));
-  if (!letter || recognize_title(title.substr(0, 1)) || !is_unit(unit)) return std::nullopt;
+  if (!letter || !is_unit(unit)) return std::nullopt;
+  // "f" alone is a force, and "f/Hz" a frequency.
+  const bool frequency = parse_unit(unit, {}).dimension == Dimension::frequency;
+  if (recognize_title(title.substr(0, 1)) && !frequency) return std::nullopt;
   if (is_plain_number(unit)) return std::nullopt;
   return ColumnTitle{std::string(1, symbol), unit};
 }
@@ -124,7 +127,10 @@ ColumnTitle split_title(std::string_view title) {
                                  ? std::string()
                                  : written_unit(trimmed(text.substr(open + 1, close - open - 1)));
     const bool square = text[open] == '[';
-    const std::string_view before = trimmed(text.substr(0, open));
+    std::string_view before = trimmed(text.substr(0, open));
+    if (before.size() > 1 && before.back() == '/') {  // "J/(1/Pa)"
+      before = trimmed(before.substr(0, before.size() - 1));
+    }
     const bool number = is_plain_number(unit) && !(square && unit == "1");
     if (!unit.empty() && !number &&
         (square || is_unit(unit) || is_foreign_unit(unit) || force_of_weight(unit) ||

@@ -244,17 +244,17 @@ constexpr auto kWords = std::to_array<TitleWord>({
     {"y", {ColumnRole::response, Quantity::ordinate, 9}},
 });
 
-/// G', G'', E', E" and the like, with straight or typographic primes: a letter and one or two of
-/// them. G* and |G*| are the magnitude.
+/// G', G'', E', E", J' and the like, with straight or typographic primes: a letter and one or two
+/// of them. G* and |G*| are the magnitude.
 std::optional<Recognized> recognize_primes(std::string_view name) {
   std::u32string text = utf8::utf8to32(std::string(trimmed(name)));
   if (text.size() > 3 && text.front() == U'|' && text.back() == U'|') {
     text = text.substr(1, text.size() - 2);
   }
-  if (text.size() < 2 || std::u32string_view(U"GEKgek").find(text[0]) == std::u32string::npos) {
+  if (text.size() < 2 || std::u32string_view(U"GEKgekJ").find(text[0]) == std::u32string::npos) {
     return std::nullopt;
   }
-  if (text.substr(1) == U"*") return kMagnitude;
+  if (text.substr(1) == U"*") return text[0] == U'J' ? std::nullopt : std::optional(kMagnitude);
   int primes = 0;
   for (const char32_t c : std::u32string_view(text).substr(1)) {
     if (c == U'\'' || c == U'\u2032' || c == U'\u2019') {
@@ -280,12 +280,43 @@ std::optional<Recognized> recognize_step_response(std::string_view name) {
   return std::nullopt;
 }
 
+bool has_word(const std::vector<std::string>& words, std::string_view word) {
+  return std::find(words.begin(), words.end(), word) != words.end();
+}
+
+bool has_word_of(const std::vector<std::string>& words,
+                 std::initializer_list<std::string_view> known) {
+  return std::ranges::any_of(known, [&words](auto word) { return has_word(words, word); });
+}
+
+/// The function that is the first or last word of a title: "Mean G(t)", "G(t) specimen 2".
+std::optional<Recognized> function_beside_words(std::string_view name) {
+  const std::string_view title = trimmed(name);
+  const auto first = title.find(' '), last = title.rfind(' ');
+  if (first == std::string_view::npos) return std::nullopt;
+  const auto function = recognize_step_response(title.substr(last + 1));
+  return function ? function : recognize_step_response(title.substr(0, first));
+}
+
+/// None if the words say that the numbers are others: logarithms, limits, a fitted curve.
+std::optional<Recognized> unless_other(Recognized function, const std::vector<std::string>& words) {
+  if (has_word_of(words, {"sd", "stdev", "stddev"})) return kSd;
+  const bool other = has_word_of(
+      words,
+      {"log",      "log10",       "lg",         "ln",       "norm",   "normalized", "normalised",
+       "normiert", "relative",    "ratio",      "lower",    "upper",  "ci",         "low",
+       "high",     "se",          "sem",        "std",      "cv",     "fit",        "fitted",
+       "model",    "predicted",   "prediction", "residual", "calc",   "calculated", "smoothed",
+       "sigma",    "uncertainty", "deviation",  "variance", "theory", "simulated"});
+  if (other || find_refused_word(words)) return std::nullopt;
+  function.rank += 1;  // a title of nothing else says more
+  return function;
+}
+
 /// L/L0: a length over the unloaded one, the zero as a letter, a digit or an index.
 bool is_ratio_of_lengths(std::string_view name) {
-  std::string text;
-  for (const char c : name) {
-    if (c != ' ' && c != '_') text += c;
-  }
+  std::string text(name);
+  std::erase_if(text, [](char c) { return c == ' ' || c == '_'; });
   constexpr auto kRatios = std::to_array<std::string_view>(
       {"L/L0", "l/l0", "L/Lo", "l/lo", "L/L\xE2\x82\x80", "l/l\xE2\x82\x80"});
   return std::ranges::find(kRatios, text) != kRatios.end();
@@ -316,10 +347,6 @@ std::string spelled_out(std::string_view name) {
   return text;
 }
 
-bool has_word(const std::vector<std::string>& words, std::string_view word) {
-  return std::find(words.begin(), words.end(), word) != words.end();
-}
-
 /// The word without the number behind it: "force2" is the second force.
 std::string_view without_number(std::string_view word) {
   const auto last = word.find_last_not_of("0123456789");
@@ -341,8 +368,15 @@ std::optional<Recognized> recognize_words(const std::vector<std::string>& words)
   const bool tangent = has_word(words, "tan") || has_word(words, "tangent") ||
                        (has_word(words, "loss") && has_word(words, "factor"));
   if (tangent) return kLossTangent;
-  if (has_word(words, "compliance")) return kCompliance;
-  if (has_word(words, "modulus") && has_word(words, "relaxation")) return kRelaxation;
+  if (has_word_of(words, {"compliance", "complaisance", "cedevolezza", "nachgiebigkeit",
+                          "kriechnachgiebigkeit"})) {
+    // "Storage compliance" and "loss compliance" are those of an oscillation.
+    if (has_word(words, "storage")) return kStorage;
+    return has_word(words, "loss") ? kLoss : kCompliance;
+  }
+  const bool relaxation = has_word_of(words, {"relaxation", "relajacion", "rilassamento"}) &&
+                          has_word_of(words, {"modulus", "module", "modulo"});
+  if (relaxation || has_word(words, "relaxationsmodul")) return kRelaxation;
   const auto meaning_of = [](std::string_view word) {
     const auto known = std::find_if(kWords.begin(), kWords.end(),
                                     [word](const TitleWord& w) { return w.word == word; });
@@ -403,6 +437,7 @@ bool is_dimension_of(const Recognized& meaning, Dimension dimension) {
       return dimension == Dimension::frequency;
     case ColumnRole::storage:
     case ColumnRole::loss:
+      return is_one_of({Dimension::stress, Dimension::stiffness, Dimension::compliance});
     case ColumnRole::magnitude:
       return is_one_of({Dimension::stress, Dimension::stiffness});
     case ColumnRole::phase:
@@ -419,6 +454,10 @@ bool is_dimension_of(const Recognized& meaning, Dimension dimension) {
 std::optional<Recognized> recognize_title(std::string_view name) {
   if (const auto primes = recognize_primes(name)) return primes;
   if (const auto function = recognize_step_response(name)) return function;
+  if (const auto function = function_beside_words(name)) {
+    return unless_other(*function, words_of(name));
+  }
+  if (is_normalised(name)) return std::nullopt;
   if (is_ratio_of_lengths(name)) return kStretch;
   const std::vector<std::string> words = title_words(name);
   const auto known = recognize_words(words);
@@ -435,6 +474,14 @@ std::optional<RefusedTitle> refused_title(std::string_view name) {
   if (!known || known->role == ColumnRole::sd) return std::nullopt;
   if (!refused) return std::nullopt;
   return RefusedTitle{*known, fmt::format("'{}' {}", refused->word, refused->why), refused->asked};
+}
+
+bool is_normalised(std::string_view name) {
+  std::string text(name);
+  std::erase_if(text, [](char c) { return c == ' ' || c == '_'; });
+  return std::ranges::any_of(
+      std::to_array<std::string_view>({"/G0", "/E0", "/J0", "/G(0)", "/E(0)", "/J(0)"}),
+      [&text](std::string_view end) { return text.ends_with(end); });
 }
 
 bool is_logarithm(std::string_view name) {

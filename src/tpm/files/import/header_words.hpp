@@ -24,7 +24,8 @@ enum class ColumnRole {
   deflection,    ///< of that cantilever, as a length or as the signal of its detector
 };
 
-/// The meaning of a title in English, French, German, Spanish or Italian, or as G', G", E' and E".
+/// The meaning of a title in English, French, German, Spanish or Italian, or as G', G", E', E", J'
+/// and J".
 struct Recognized {
   ColumnRole role;
   Quantity quantity;
@@ -45,6 +46,9 @@ struct RefusedTitle {
 
 /// True if numbers in this dimension can be what a title says.
 [[nodiscard]] bool is_dimension_of(const Recognized& meaning, Dimension dimension);
+
+/// True for "G(t)/G0", "E/E(0)": a share of the first reading.
+[[nodiscard]] bool is_normalised(std::string_view name);
 
 /// True for "log w", "lg G'", "ln(G)", "log10(omega)".
 [[nodiscard]] bool is_logarithm(std::string_view name);

@@ -246,7 +246,9 @@ std::vector<Use> spectrum_uses(const ColumnChoice& choice, const std::string& fi
   if (!chosen && (frequency == nullptr || (storage == nullptr && loss == nullptr && !polar))) {
     return {};
   }
-  if (frequency != nullptr && storage != nullptr && loss == nullptr && tangent != nullptr) {
+  const bool compliance = storage != nullptr && is_compliance(*storage);
+  if (frequency != nullptr && storage != nullptr && loss == nullptr && tangent != nullptr &&
+      !compliance) {
     return {{frequency, Quantity::frequency, Bound::value, false},
             {storage, spectrum_quantity(*storage, false), Bound::value, false},
             {tangent, Quantity::abscissa, Bound::value, false}};
@@ -262,12 +264,26 @@ std::vector<Use> spectrum_uses(const ColumnChoice& choice, const std::string& fi
                                               std::tuple{storage, "a storage modulus", "--storage"},
                                               std::tuple{loss, "a loss modulus", "--loss"}}) {
     if (column != nullptr) continue;
+    const std::string others = choice.list({frequency, storage, loss});
     throw bad_input(file, fmt::format("no column is recognised as {}", words),
-                    fmt::format("{} with one of {}", option, choice.list()));
+                    others.empty()
+                        ? fmt::format("{} with a column of it: a law is fitted to storage and loss "
+                                      "(or |G*| and delta, or G' and tan delta)",
+                                      option)
+                        : fmt::format("{} with one of {}", option, others));
   }
+  if (storage == loss) {
+    throw bad_input(fmt::format("{}: {}", file, storage->label()), "both storage and loss",
+                    "--storage and --loss with a column each");
+  }
+  const auto part = [](const MachineColumn& column, bool of_loss) {
+    Use use{&column, spectrum_quantity(column, of_loss), Bound::value, false};
+    if (is_compliance(column)) use.dimension = Dimension::compliance;
+    return use;
+  };
   return {{frequency, Quantity::frequency, Bound::value, false},
-          {storage, spectrum_quantity(*storage, false), Bound::value, false},
-          {loss, spectrum_quantity(*loss, true), Bound::value, false}};
+          part(*storage, false),
+          part(*loss, true)};
 }
 
 /// Storage and loss from the magnitude, or the storage, and from the phase angle or its tangent.
@@ -334,6 +350,12 @@ void require_no_other_sweep(const ColumnChoice& choice, const std::string& file)
         "amplitude, the temperature or the time",
         fmt::format("a sweep of the frequency, or --frequency with one of {}", choice.list()));
   }
+  const bool timed = choice.by_title(ColumnRole::time, "--time") != nullptr;
+  if (timed || choice.by_title(ColumnRole::frequency, "--frequency") == nullptr) return;
+  throw bad_input(file, "a frequency without a storage and a loss modulus",
+                  fmt::format("columns of both (or |G*| and delta, or G' and tan delta); --storage "
+                              "and --loss choose among {}",
+                              choice.list()));
 }
 
 bool is_clock(const DelimitedTable& table, const MachineHeader& header,
@@ -368,6 +390,7 @@ std::vector<Use> recording_uses(const DelimitedTable& table, const MachineHeader
           "the number and the unit of each column: --time 1 --drive 2 --response 3 --unit 1=s "
           "--unit 2=mm --unit 3=N, if they are these");
     }
+    require_more_than_ratio(header, file);
     throw bad_input(file, "no column is recognised as a force, stress, modulus or compliance",
                     fmt::format("--response with one of {}", choice.list()));
   }
@@ -434,12 +457,16 @@ ImportedSeries read_machine(const DelimitedTable& table, const std::string& file
   }
   if (spectrum) {
     resolve_phase(series, uses);
+    resolve_compliances(series, file);
+    tell_unread_deviations(header, series);
   } else {
     resolve_cantilever(series, cantilever_columns(uses), file, options);
     divide_by_size(series, options);
+    sort_shuffled_rows(series);
     keep_time_window(series, file, options);
     resolve_kept_step(series);
     require_step_clock(series, file, options);
+    leave_out_zero_at_step(series);
   }
   series.name = header.sheet;
   series.findings.insert(

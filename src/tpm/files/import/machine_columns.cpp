@@ -117,6 +117,10 @@ Quantity response_quantity(const MachineColumn& column, const ImportOptions& opt
   return titled;
 }
 
+bool is_compliance(const MachineColumn& column) {
+  return has_dimension(column, Dimension::compliance);
+}
+
 Quantity spectrum_quantity(const MachineColumn& column, bool loss) {
   const bool stiffness = is_unit(column.unit) &&
                          parse_unit(column.unit, column.name).dimension == Dimension::stiffness;
@@ -138,12 +142,64 @@ Quantity drive_quantity(const MachineColumn& column, const ImportOptions& option
 }
 
 std::string finding_name(const ColumnUse& use) {
+  if (use.dimension == Dimension::compliance) {
+    const bool loss = use.quantity == spectrum_quantities(Dimension::stress).loss;
+    return loss ? "loss_compliance" : "storage_compliance";
+  }
   if (use.dimension == Dimension::angle) return "phase_angle";
   if (use.taken_away) return "deflection";
   if (use.column->meaning && use.column->meaning->role == ColumnRole::loss_tangent) {
     return "loss_tangent";
   }
   return std::string(quantity_name(use.quantity));
+}
+
+void resolve_compliances(ImportedSeries& series, const std::string& file) {
+  const SpectrumQuantities moduli = spectrum_quantities(Dimension::stress);
+  std::vector<ImportedColumn*> parts;
+  for (ImportedColumn& column : series.columns) {
+    if (column.unit.dimension == Dimension::compliance) parts.push_back(&column);
+  }
+  if (parts.empty()) return;
+  if (parts.size() != 2 || parts[0]->quantity != moduli.storage ||
+      parts[1]->quantity != moduli.loss) {
+    throw bad_input(file, "a compliance beside another kind of column",
+                    "storage and loss compliance (J' and J''), or storage and loss modulus");
+  }
+  for (std::size_t i = 0; i < parts[0]->values.size(); ++i) {
+    const double storage = parts[0]->values[i] * parts[0]->unit.to_si;
+    const double loss = parts[1]->values[i] * parts[1]->unit.to_si;
+    const double square = storage * storage + loss * loss;
+    parts[0]->values[i] = storage / square;
+    parts[1]->values[i] = loss / square;
+  }
+  for (ImportedColumn* part : parts) {
+    part->unit = parse_unit(si_symbol(Dimension::stress), Dimension::stress, {});
+    part->shifted = true;  // converted: not the digits of the file
+  }
+  series.findings.push_back(
+      ImportFinding::told_of("converted", "compliances to storage and loss modulus"));
+}
+
+void require_more_than_ratio(const MachineHeader& header, const std::string& file) {
+  for (const MachineColumn& column : header.columns) {
+    if (!is_normalised(column.name)) continue;
+    throw bad_input(
+        fmt::format("{}: {}", file, column.label()), "a share of another reading, by its title",
+        fmt::format("the modulus or compliance itself with its unit; or, to fit the shares as if "
+                    "they were Pa, --response {0} --response-quantity relaxation_modulus --unit "
+                    "{0}=Pa",
+                    column.index + 1));
+  }
+}
+
+void tell_unread_deviations(const MachineHeader& header, ImportedSeries& series) {
+  for (const MachineColumn& column : header.columns) {
+    if (!column.meaning || column.meaning->role != ColumnRole::sd) continue;
+    series.findings.push_back(ImportFinding::told_of(
+        "not read",
+        fmt::format("{}: standard deviations of a spectrum need a description", column.label())));
+  }
 }
 
 void resolve_specimen(ColumnUse& drive, ColumnUse& response, const std::string& file,

@@ -37,6 +37,18 @@ void require_units(const std::vector<ColumnUse>& uses, const std::string& file);
 /// A column titled "F" in kPa holds a stress: the unit says what the title cannot.
 [[nodiscard]] Quantity response_quantity(const MachineColumn& column, const ImportOptions& options);
 
+[[nodiscard]] bool is_compliance(const MachineColumn& column);
+
+/// Storage and loss modulus from storage and loss compliance, G' + iG'' = 1/(J' - iJ''). Throws
+/// Error(bad_input) if a compliance has anything else beside it.
+void resolve_compliances(ImportedSeries& series, const std::string& file);
+
+/// Refuses a relaxation in shares of its first reading, naming the options that fit it as it is.
+void require_more_than_ratio(const MachineHeader& header, const std::string& file);
+
+/// Says which standard deviations of a spectrum are not read: they need a described curve.
+void tell_unread_deviations(const MachineHeader& header, ImportedSeries& series);
+
 /// Storage and loss in N/m are dynamic stiffnesses, else moduli.
 [[nodiscard]] Quantity spectrum_quantity(const MachineColumn& column, bool loss);
 

@@ -359,6 +359,7 @@ SampleBlock chosen_block(const DelimitedTable& table, const std::string& file,
                          const ImportOptions& options, const std::vector<SampleBlock>& all,
                          MachineHeader& header) {
   if (all.empty()) {
+    require_one_number_a_cell(table, file);
     throw bad_input(
         file,
         fmt::format("no row with two or more numbers between {} separators",

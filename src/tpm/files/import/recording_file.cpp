@@ -179,11 +179,21 @@ void require_time_and_drive(const RecordingFile& read, const std::string& file) 
   const bool timed = !recording.time_s.empty();
   const bool driven = !recording.drive.empty() || is_step_response(recording.response_quantity);
   const auto others = std::ranges::find(read.findings, "not used", &ImportFinding::what);
-  if (timed == driven || others == read.findings.end()) return;
+  if (timed == driven) return;
+  const bool stress = timed && recording.response_quantity == Quantity::stress;
+  if (others == read.findings.end() && !stress) return;
+  std::string expected;
+  if (others != read.findings.end()) {
+    expected = fmt::format("{} with one of {}", timed ? "--drive" : "--time", others->value);
+  }
+  if (stress) {
+    expected += fmt::format("{}--response-quantity relaxation_modulus for a G(t) or E(t)",
+                            expected.empty() ? "" : "; or ");
+  }
   throw bad_input(file,
                   timed ? "no column is recognised as a depth, displacement, strain or length"
                         : "no column is recognised as time",
-                  fmt::format("{} with one of {}", timed ? "--drive" : "--time", others->value));
+                  expected);
 }
 
 RecordingFile read_recording_file(const fs::path& path, const ImportOptions& options) {

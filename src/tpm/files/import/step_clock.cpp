@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numeric>
 #include <vector>
 
 #include "tpm/base/namespaces.hpp"
@@ -127,6 +128,47 @@ void resolve_kept_step(ImportedSeries& series) {
   series.columns.erase(relaxation ? strain : stress);
 }
 
+void sort_shuffled_rows(ImportedSeries& series) {
+  const ImportedColumn* time = time_of(series);
+  if (time == nullptr || series.lines.empty() || !holds_step_response(series)) return;
+  const std::vector<double>& times = time->values;
+  std::size_t falls = 0;
+  for (std::size_t i = 1; i < times.size(); ++i) falls += times[i] < times[i - 1] ? 1 : 0;
+  constexpr std::size_t kRowsAFall = 4;  // specimens below each other fall less often
+  if (falls == 0 || kRowsAFall * falls < times.size()) return;
+  std::vector<std::size_t> order(times.size());
+  std::iota(order.begin(), order.end(), std::size_t{0});
+  std::ranges::sort(order, {}, [&times](std::size_t i) { return times[i]; });
+  for (std::size_t i = 1; i < order.size(); ++i) {
+    if (times[order[i]] == times[order[i - 1]]) return;  // may be of two specimens
+  }
+  const auto sorted = [&order](const auto& values) {
+    auto result = values;
+    for (std::size_t i = 0; i < order.size(); ++i) result[i] = values[order[i]];
+    return result;
+  };
+  series.lines = sorted(series.lines);
+  for (ImportedColumn& column : series.columns) column.values = sorted(column.values);
+  series.findings.push_back(
+      ImportFinding::told_of("order", "the times stood in no order: rows sorted by them"));
+}
+
+void leave_out_zero_at_step(ImportedSeries& series) {
+  constexpr std::size_t kFewest = 4;
+  const ImportedColumn* time = time_of(series);
+  if (time == nullptr || !holds_step_response(series) || time->values.size() < kFewest) return;
+  const auto answer = std::ranges::find_if(series.columns, [](const ImportedColumn& column) {
+    return is_step_response(column.quantity) && column.bound == Bound::value;
+  });
+  const bool zero = time->values[0] == 0.0 && answer->values[0] == 0.0;
+  if (!zero || !(time->values[1] > 0.0) || !(answer->values[1] > 0.0)) return;
+  const std::size_t rows = time->values.size();
+  for (ImportedColumn& column : series.columns) keep_rows(column.values, 1, rows);
+  keep_rows(series.lines, 1, rows);
+  series.findings.push_back(
+      ImportFinding::told_of("left out", "the reading of 0 at 0 s, which is from before the step"));
+}
+
 bool counts_from_step(const std::vector<double>& times) {
   constexpr double kSteps = 2.0;  // of the sampling, after which a clock is late
   constexpr double kRounding = 1e-6;
@@ -153,16 +195,18 @@ void require_step_clock(const ImportedSeries& series, const std::string& file,
         "--step-time only with G(t), J(t), or a strain or stress that is kept after it");
   }
   const ImportedColumn* time = time_of(series);
-  if (!step || time == nullptr || counts_from_step(time->values)) return;
+  if (!step || time == nullptr) return;
+  std::vector<double> times = time->values;  // repeated readings have one
+  times.erase(std::unique(times.begin(), times.end()), times.end());
+  if (counts_from_step(times)) return;
   const double to_si = time->unit.to_si;
   throw bad_input(
       file,
       fmt::format("the first sample is {} s after the step, by a clock that ticks every {} s",
-                  significant(time->values[0] * to_si, 6),
-                  significant((time->values[1] - time->values[0]) * to_si, 3)),
+                  significant(times[0] * to_si, 6), significant((times[1] - times[0]) * to_si, 3)),
       fmt::format("--step-time with the time of the step on this clock, such as --step-time \"{} "
                   "s\"; --step-time \"0 s\" if it counts from the step",
-                  significant((time->values[0] - (time->values[1] - time->values[0])) * to_si, 6)));
+                  significant((times[0] - (times[1] - times[0])) * to_si, 6)));
 }
 
 }  // namespace tpm::files

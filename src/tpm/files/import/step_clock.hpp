@@ -16,6 +16,14 @@ void keep_time_window(ImportedSeries& series, const std::string& file,
 /// series stay as they are.
 void resolve_kept_step(ImportedSeries& series);
 
+/// Sorts the rows of G(t) or J(t) by their times, if these are all different and fall so often that
+/// the rows are no specimens below each other.
+void sort_shuffled_rows(ImportedSeries& series);
+
+/// Leaves out a reading of exactly 0 at time 0 of G(t) or J(t), if the next one is above 0: it was
+/// taken before the step, and a law's answer at the step itself is that right behind it.
+void leave_out_zero_at_step(ImportedSeries& series);
+
 /// True if samples that begin late may count from a step at 0. Times in geometric progression may,
 /// and so may times that begin within two steps of the sampling; others are those of a clock that
 /// ran before the step.

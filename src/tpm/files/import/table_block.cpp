@@ -3,9 +3,12 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <array>
 
+#include "tpm/base/text.hpp"
 #include "tpm/files/clock_text.hpp"
 #include "tpm/files/number_style.hpp"
+#include "tpmkit/error.hpp"
 
 namespace tpm::files {
 namespace {
@@ -102,6 +105,23 @@ class BlockFinder {
 };
 
 }  // namespace
+
+void require_one_number_a_cell(const DelimitedTable& table, const std::string& file) {
+  constexpr auto kMarks = std::to_array<std::string_view>({"\xC2\xB1", "+/-", "+-"});
+  for (const DelimitedRow& row : table.rows) {
+    for (const std::string_view field : row.fields) {
+      const bool digits = !field.empty() && field.front() >= '0' && field.front() <= '9';
+      const bool both = digits && std::ranges::any_of(kMarks, [field](std::string_view mark) {
+                          return field.find(mark) != std::string_view::npos;
+                        });
+      if (!both) continue;
+      throw bad_input(fmt::format("{}:{}", file, row.line),
+                      fmt::format("'{}' in one cell", printable(field)),
+                      "the value and its standard deviation in columns of their own, such as G(t) "
+                      "[kPa] and SD [kPa]");
+    }
+  }
+}
 
 std::vector<SampleBlock> find_sample_blocks(const DelimitedTable& table) {
   return BlockFinder(table).find();

@@ -24,6 +24,9 @@ struct SampleBlock {
 /// A row that lacks numbers inside a block belongs to it: whoever reads it refuses it.
 [[nodiscard]] std::vector<SampleBlock> find_sample_blocks(const DelimitedTable& table);
 
+/// Refuses "5.36 +- 0.16" in one cell, with a sign of any kind between. Throws Error(bad_input).
+void require_one_number_a_cell(const DelimitedTable& table, const std::string& file);
+
 /// The block of all rows from `header_rows` on.
 [[nodiscard]] SampleBlock block_below(const DelimitedTable& table, std::size_t header_rows);
 

@@ -10,6 +10,7 @@
 #include "tpm/base/quantity_text.hpp"
 #include "tpm/base/text.hpp"
 #include "tpm/files/import/recording_file.hpp"
+#include "tpm/fit/adequacy.hpp"
 #include "tpm/fit/select/fit_adequacy.hpp"
 #include "tpm/fit/select/fixed_times.hpp"
 #include "tpm/fit/select/function_starts.hpp"
@@ -222,6 +223,35 @@ std::vector<Remark> range_remarks(const FitResult& fit, const FunctionSizes& siz
   return remarks;
 }
 
+/// A master curve that no law of few branches describes may be a Prony series on stated times, one
+/// a decade. A modulus that rises is none.
+std::optional<Remark> prony_remark(const MaterialFunction& function, const FitResult& fit,
+                                   const SelectionOptions& options) {
+  constexpr double kLeastDecades = 3.0, kRise = 0.9;
+  constexpr int kMostTimes = 31;
+  const auto* step = std::get_if<Recording>(&function.data);
+  const FunctionSizes sizes = sizes_of_function(function);
+  const bool stated =
+      options.only_listed || !options.laws.empty() || !options.setup.times_s.empty();
+  const bool described =
+      !fit.adequacy || fit.adequacy->verdict != described_name(Described::not_described);
+  const bool falls =
+      step == nullptr || (!sizes.compliance && step->response.front() >= kRise * sizes.largest);
+  const double decades = std::log10(sizes.longest_s / sizes.shortest_s);
+  if (stated || described || !falls || decades < kLeastDecades) return std::nullopt;
+  const int whole = static_cast<int>(std::lround(decades));
+  const auto enough = [&](int times) {
+    return times <= kMostTimes && 2 * times <= fit.value_count;
+  };
+  const int times = enough(2 * whole + 1) ? 2 * whole + 1 : whole + 1;
+  if (!enough(times)) return std::nullopt;
+  return Remark{"prony_series",
+                fmt::format("{} decades of time: a Prony series on stated times may describe "
+                            "them: --times \"{} s : {} s : {}\"",
+                            significant(decades, 2), significant(sizes.shortest_s, 2),
+                            significant(sizes.longest_s, 2), times)};
+}
+
 std::vector<LawSpec> linear_family() {
   std::vector<LawSpec> laws;
   constexpr int kMost = 4;
@@ -399,6 +429,8 @@ Selection select_law(const MaterialFunction& function, const SelectionOptions& o
   state_scatter(s);
   const Candidate& chosen = s.candidates[s.recommended];
   s.remarks = range_remarks(chosen.fit, sizes_of_function(function));
+  auto prony = s.preferred ? std::nullopt : prony_remark(function, chosen.fit, options);
+  if (prony) s.remarks.push_back(*std::move(prony));
   if (standing) {
     const Unit unit = shown_unit(quantity_dimension(chosen.fit.data.front().datum.quantity));
     s.remarks.push_back(
