@@ -44,7 +44,7 @@ struct ValidateOptions {
   std::string folder, output;
   std::string credibility, recheck;
   std::vector<std::string> evidence;
-  CredibilityWords words;
+  CredibilitySummary summary;
 };
 
 /// The block of a file that holds it alone or under "instrument".
@@ -260,8 +260,8 @@ ValidateOptions options_of(const Json& record, const std::string& page) {
     const std::string tolerance = i.value("plan", "");
     o.plan = !tolerance.empty();
     if (o.plan) o.planned.tolerance = tolerance;
-    const Json& words = record.at("words");
-    o.words = {words.at("question"), words.at("context"), words.at("risk")};
+    const Json& summary = record.at("summary");
+    o.summary = {summary.at("question"), summary.at("context"), summary.at("risk")};
     return o;
   } catch (const Json::exception&) {
     throw bad_input(page, "its record is damaged",
@@ -296,7 +296,7 @@ Json record_of(const ValidateOptions& options, const ValidationRequest& request,
   if (request.organ && material != options.law && std::filesystem::exists(material)) {
     others.push_back(material.string());
   }
-  return credibility_record(request, validation, options.words, invocation_of(options),
+  return credibility_record(request, validation, options.summary, invocation_of(options),
                             evidence_of(options), others);
 }
 
@@ -462,11 +462,11 @@ void add_validate_command(CLI::App& app, Session& session) {
                    "repeated); the file is named with its SHA-256")
       ->allow_extra_args(false)
       ->needs(credibility);
-  command->add_option("--question", options->words.question, "Question of interest, of that page")
+  command->add_option("--question", options->summary.question, "Question of interest, of that page")
       ->needs(credibility);
-  command->add_option("--context", options->words.context, "Context of use, of that page")
+  command->add_option("--context", options->summary.context, "Context of use, of that page")
       ->needs(credibility);
-  command->add_option("--risk", options->words.risk, "Model risk, of that page")
+  command->add_option("--risk", options->summary.risk, "Model risk, of that page")
       ->needs(credibility);
   command->add_option("--recheck", options->recheck,
                       "Compute a page of --credibility again and write beside it one "
