@@ -160,7 +160,7 @@ void set_recordings(ValidationRequest& request, const ValidateOptions& options) 
   for (const std::string& file : files) add_presses(request, file);
 }
 
-/// What a session's rendering changes, from the subject along the hand's own motion.
+/// Adds the error of a session's rendering, from the subject along the hand's own motion.
 void add_rendering(ValidationRequest& request, const ValidateOptions& options) {
   if (options.session.empty()) return;
   ValidationRequest presses = request;
@@ -219,7 +219,7 @@ ValidationRequest validation_request(const ValidateOptions& options) {
   return request;
 }
 
-/// What a credibility page needs to ask again.
+/// Options that a credibility page needs to repeat the command.
 Json invocation_of(const ValidateOptions& o) {
   Json invocation{{"law", o.law},
                   {"recordings", o.recordings.files},

@@ -104,7 +104,7 @@ class EvidencePage {
     d.table(std::move(table));
   }
 
-  /// What was found by the validation itself, of the categories that it fills.
+  /// Categories filled by the validation itself.
   [[nodiscard]] std::map<std::string, Cell> found() const {
     std::string calibration = "files that the law does not name";
     const Json& files = validation_.at("calibration");

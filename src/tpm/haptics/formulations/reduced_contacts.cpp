@@ -95,7 +95,7 @@ std::size_t by_exponentials(const FormulationChoice& choice) {
   return static_cast<std::size_t>(choice.exponentials) - 1;
 }
 
-/// What sees one contact along its push, whatever drives it.
+/// Formulations of one contact along its push, whatever drives it.
 constexpr Capabilities kAlongPush{.network = true,
                                   .depth = true,
                                   .load = true,
@@ -108,7 +108,7 @@ constexpr Capabilities kAlongPush{.network = true,
                                   .stiffening = true,
                                   .any_potential = true,
                                   .regions = true};
-/// What sees one sphere that is moved in space.
+/// Formulations of one sphere that moves in space.
 constexpr Capabilities kInSpace{.network = true,
                                 .depth = true,
                                 .servo = true,

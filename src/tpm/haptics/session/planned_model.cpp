@@ -96,7 +96,7 @@ Json json_of(const Plan& plan) {
           {"candidates", std::move(candidates)}};
 }
 
-/// What a plan is asked for that has no answer.
+/// Error of a plan without an answer.
 Error no_model(const Plan& plan) {
   const std::string instead =
       plan.without_budget

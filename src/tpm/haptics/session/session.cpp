@@ -89,7 +89,7 @@ double furthest_along_x(const HilSession& session, const Eigen::Vector3d& surfac
   return furthest;
 }
 
-/// How far from the centre of the workspace the hand may be before the session, m. Without a
+/// Largest distance of the hand from the centre of the workspace before the session, m. Without a
 /// surface of its own the session has to fit in from wherever the hand is then.
 double start_room_m(const HilSession& session, const DeviceLimits& device) {
   if (!session.servo.surface_before_hand_m) return device.reach_m;

@@ -27,7 +27,7 @@ Network joined(OrganBlock block, const NetworkOptions& options, const std::strin
   return join(std::move(block.organ), kElement, options, where);
 }
 
-/// What is fixed if the scene does not say.
+/// Anchors of a scene that states none.
 std::vector<AnchorKeys> usual_anchors(bool star, bool liver) {
   if (star) return {{.kind = AnchorKind::spheres, .spheres = {1, 3, 4}}};
   if (liver) return {{.kind = AnchorKind::far_side, .spheres = {}}};
