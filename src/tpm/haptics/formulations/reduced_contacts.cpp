@@ -49,10 +49,10 @@ class ReducedLoop final : public ReducedContact, public LoopMaker {
 };
 
 LoopModel element_model(const HilSession& session) {
-  const SceneKeys scene = scene_block().made(session.scene, {session.scene_place});
+  const SceneKeys scene = scene_block().made(session.scene, session.scene_place);
   const Tissue tissue = tissue_of(scene, session.scene_place, {});
   if (scene.organ.kind != OrganKind::star) {
-    throw bad_input(session.scene_place, "is no star",
+    throw bad_input(session.scene_place.where, "is no star",
                     "an organ of the kind star for the model 'element'");
   }
   LoopModel loop;

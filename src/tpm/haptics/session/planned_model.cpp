@@ -201,7 +201,7 @@ LoopModel offered_loop(const Formulation& formulation, const HilSession& session
     if (outside == 0) break;
   }
   if (found) return std::move(*found);
-  throw bad_input(session.scene_place,
+  throw bad_input(session.scene_place.where,
                   fmt::format("the model '{}' has no answer: {}", formulation.name(), reason),
                   fmt::format("one of {}, {}", kPlannedModel, formulations_that(for_sessions)));
 }

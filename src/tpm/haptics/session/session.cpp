@@ -149,7 +149,7 @@ void set_tissue(HilSession& session, const SessionModelKeys& model, const Docume
   }
   const std::filesystem::path file =
       tissue.is_string() ? folder / tissue.get<std::string>() : std::filesystem::path();
-  const std::string where = tissue.is_string() ? file.string() : at.where;
+  const DocumentPlace where = tissue.is_string() ? DocumentPlace{file.string()} : at;
   if (by_law) {
     session.law = law_from_json(tissue.is_string() ? read_json(file) : tissue, where);
   } else {
@@ -157,7 +157,7 @@ void set_tissue(HilSession& session, const SessionModelKeys& model, const Docume
     session.scene =
         with_mesh_listed(without_schema_key(tissue.is_string() ? read_json(file) : tissue), where,
                          tissue.is_string() ? file.parent_path() : folder);
-    require_hand_alone(session.scene, {where});
+    require_hand_alone(session.scene, where);
   }
 }
 
@@ -169,7 +169,7 @@ void set_contact(HilSession& session, const SessionModelKeys& model, const Docum
                     "a kind that moves spheres of a scene, such as planned or curves");
   }
   session.contact = model.contact;
-  session.contact_place = at.where;
+  session.contact_place = at;
 }
 
 void set_tolerance_of(HilSession& session, const SessionModelKeys& model,
