@@ -19,7 +19,7 @@
 namespace tpm::app {
 namespace {
 
-/// What is written besides the report.
+/// Names of the files written besides the report.
 std::string tables_of(const StabilityParts& parts) {
   std::vector<std::string> names;
   if (parts.limits) names.emplace_back("limits.csv");

@@ -65,7 +65,7 @@ std::string seen_text(const SeenDevice& device) {
                      limits_of(device.kind).tried ? "" : " (never tried with this device)");
 }
 
-/// What a plugin says of its devices; nothing is opened.
+/// Lists the devices of a plugin; opens none.
 int list_plugin(const DeviceOptions& options, const Session& session) {
   const DevicePlugin plugin(options.plugin);
   Json list = Json::array();
@@ -252,7 +252,7 @@ SessionRunOptions run_options(const RunChoice& choice, bool hardware) {
   require_short(choice.notes.date, "--date");
   require_short(choice.notes.operator_code, "--operator");
   require_short(choice.notes.subject_code, "--subject");
-  // What is simulated is the same bytes each time.
+  // A simulated recording has the same bytes each time.
   if (hardware && options.notes.date.empty()) options.notes.date = utc_now();
   options.wish = chosen_wish(choice.device);
   options.recording = choice.output;

@@ -48,8 +48,7 @@ void require_used(const CheckChoice& choice, const DeviceChoice& device) {
   }
 }
 
-/// What `tpm hil run` would say to the session, as far as it says it before the first force of the
-/// tissue.
+/// Verdict of `tpm hil run` on the session, up to the first force of the tissue.
 SessionVerdict asked_gate(const HilSession& hil, const DeviceChoice& device, RealTimeWish wish) {
   const DeviceLimits limits = limits_of(device);
   if (limits.hardware() && limits.measured_delay_s) {

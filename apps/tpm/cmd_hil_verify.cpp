@@ -56,8 +56,8 @@ int verify_hil(const VerifyChoice& choice, const Session& session) {
                fmt::format("tpm hil report {} --folder hil_report", shell_word(choice.recording)));
     say("{}", to_text(answer));
   }
-  // What is left of a recording that is damaged or cut off is verified; the answer is no all the
-  // same. A session that ended early is recorded as a whole.
+  // The rest of a damaged or truncated recording is verified, and the answer is still no. The
+  // recording of a session that ended early is whole.
   return exit_code(recording.whole());
 }
 

@@ -20,7 +20,7 @@ struct AuditOptions {
   bool verbose = false;
 };
 
-/// What writes the claims with figures into a report; of other claims there is none.
+/// Command that writes the claims with figures into a report; empty for other claims.
 std::string next_of_audit(const AuditOptions& options) {
   return options.claims.empty() ? "tpm paper report --folder paper" : "";
 }

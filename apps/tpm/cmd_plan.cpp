@@ -157,7 +157,7 @@ int calibrate(const PlanCommand& command, const Session& session) {
   return 0;
 }
 
-/// How many spheres, and the scene with them; the file's own scene if that is not asked for.
+/// Number of spheres and the scene with them; the file's own scene if none was asked for.
 struct PlannedScene {
   std::optional<SpheresPlan> spheres;
   std::optional<ExperimentScene> scene;  ///< none: no number of spheres is enough

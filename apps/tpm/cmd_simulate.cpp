@@ -243,7 +243,7 @@ int list_materials(const Session& session) {
   return 0;
 }
 
-/// What the mass-spring model answers, below what the tissue does.
+/// Adds the response of the mass-spring model below that of the tissue.
 void add_beside(ShortAnswer& answer, const ShortAnswer& mass_spring) {
   const auto append = [](std::vector<std::string>& to, const std::vector<std::string>& lines,
                          const char* before) {

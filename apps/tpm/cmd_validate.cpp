@@ -44,7 +44,7 @@ struct ValidateOptions {
   std::string folder, output;
   std::string credibility, recheck;
   std::vector<std::string> evidence;
-  CredibilityWords words;
+  CredibilitySummary summary;
 };
 
 /// The block of a file that holds it alone or under "instrument".
@@ -160,7 +160,7 @@ void set_recordings(ValidationRequest& request, const ValidateOptions& options) 
   for (const std::string& file : files) add_presses(request, file);
 }
 
-/// What a session's rendering changes, from the subject along the hand's own motion.
+/// Adds the error of a session's rendering, from the subject along the hand's own motion.
 void add_rendering(ValidationRequest& request, const ValidateOptions& options) {
   if (options.session.empty()) return;
   ValidationRequest presses = request;
@@ -219,7 +219,7 @@ ValidationRequest validation_request(const ValidateOptions& options) {
   return request;
 }
 
-/// What a credibility page needs to ask again.
+/// Options that a credibility page needs to repeat the command.
 Json invocation_of(const ValidateOptions& o) {
   Json invocation{{"law", o.law},
                   {"recordings", o.recordings.files},
@@ -260,8 +260,8 @@ ValidateOptions options_of(const Json& record, const std::string& page) {
     const std::string tolerance = i.value("plan", "");
     o.plan = !tolerance.empty();
     if (o.plan) o.planned.tolerance = tolerance;
-    const Json& words = record.at("words");
-    o.words = {words.at("question"), words.at("context"), words.at("risk")};
+    const Json& summary = record.at("summary");
+    o.summary = {summary.at("question"), summary.at("context"), summary.at("risk")};
     return o;
   } catch (const Json::exception&) {
     throw bad_input(page, "its record is damaged",
@@ -296,7 +296,7 @@ Json record_of(const ValidateOptions& options, const ValidationRequest& request,
   if (request.organ && material != options.law && std::filesystem::exists(material)) {
     others.push_back(material.string());
   }
-  return credibility_record(request, validation, options.words, invocation_of(options),
+  return credibility_record(request, validation, options.summary, invocation_of(options),
                             evidence_of(options), others);
 }
 
@@ -462,11 +462,11 @@ void add_validate_command(CLI::App& app, Session& session) {
                    "repeated); the file is named with its SHA-256")
       ->allow_extra_args(false)
       ->needs(credibility);
-  command->add_option("--question", options->words.question, "Question of interest, of that page")
+  command->add_option("--question", options->summary.question, "Question of interest, of that page")
       ->needs(credibility);
-  command->add_option("--context", options->words.context, "Context of use, of that page")
+  command->add_option("--context", options->summary.context, "Context of use, of that page")
       ->needs(credibility);
-  command->add_option("--risk", options->words.risk, "Model risk, of that page")
+  command->add_option("--risk", options->summary.risk, "Model risk, of that page")
       ->needs(credibility);
   command->add_option("--recheck", options->recheck,
                       "Compute a page of --credibility again and write beside it one "

@@ -35,7 +35,7 @@ class OrganProgress {
   std::size_t before_ = 0;
 };
 
-/// What a page shows of its file; null for what it has not.
+/// Content of a page as JSON; null for parts that its file lacks.
 Json json_of(const ViewPage& page) {
   const Json& shown = page.description;
   const Json organ = shown.value("organ", Json::object());

@@ -71,7 +71,7 @@ std::vector<std::string> called(const CLI::App& command, const std::string& name
   return found;
 }
 
-/// What other programs call a command is an option here.
+/// Options here that are commands in other programs.
 constexpr std::array<std::pair<std::string_view, std::string_view>, 4> kOptions{
     {{"select", "tpm fit --verbose"},
      {"spectrum", "tpm predict LAW --frequencies"},

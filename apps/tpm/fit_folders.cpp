@@ -22,8 +22,8 @@
 namespace tpm::app {
 namespace {
 
-/// Which specimen each recording is of: what the group of a name pattern matches, or what the file
-/// says under a key.
+/// Sets the specimen of each recording: the match of a name pattern's group, or the file's entry
+/// under a key.
 void set_specimens(const FitOptions& options, std::vector<PreparedRecording>& recordings) {
   const std::string& by = options.group_by;
   if (by.empty()) return;

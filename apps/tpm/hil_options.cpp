@@ -18,7 +18,7 @@
 namespace tpm::app {
 namespace {
 
-/// Which device of several is meant, by the number or the text that it has.
+/// Chooses one of several devices by its number or text.
 void choose_device(DeviceChoice& choice, const DeviceOptions& options) {
   const bool asked = !options.serial.empty() || options.index >= 0;
   if (asked && (choice.kind == "virtual" || choice.kind == "replay")) {

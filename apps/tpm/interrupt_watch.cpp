@@ -7,7 +7,7 @@
 namespace tpm::app {
 namespace {
 
-// What a signal handler may touch has to be of static storage.
+// A signal handler may only touch static storage.
 volatile std::sig_atomic_t stop_signal = 0, first_s = 0, patience_s = 0;
 
 std::sig_atomic_t seconds_now() {
@@ -41,8 +41,8 @@ InterruptWatch::InterruptWatch(Of of) {
     Watched watched;
     watched.signal = signal;
     if (sigaction(signal, nullptr, &watched.before) != 0) continue;
-    // What the caller ignores stays ignored: nohup tpm hil run ... Shells let what runs in the
-    // background ignore SIGINT and SIGQUIT.
+    // Signals that the caller ignores stay ignored: nohup tpm hil run ... Shells let background
+    // processes ignore SIGINT and SIGQUIT.
     const bool always = signal == SIGINT || signal == SIGTERM || signal == SIGQUIT;
     if (!always && watched.before.sa_handler != SIG_DFL) continue;
     sigaction(signal, &action, nullptr);

@@ -304,7 +304,7 @@ void occupy_closed_streams() {
   }
 }
 
-/// What was printed has to have arrived before the exit code says so.
+/// Throws unless all output was written, before the exit code claims so.
 void require_output_written() {
   const bool flushed = std::fflush(stdout) == 0;
   if (flushed && std::ferror(stdout) == 0) return;

@@ -150,7 +150,7 @@ int not_given(char* message, std::size_t room) noexcept {
   return TPM_HAPTICS_USAGE;
 }
 
-/// What a caller does not ask rightly is no force either, where there is a place for one.
+/// Sets the force to 0, if a place for it was given, and returns the code of a wrong call.
 int no_force(double* force_N) noexcept {
   if (force_N != nullptr) std::fill_n(force_N, 3, 0.0);
   return TPM_HAPTICS_USAGE;

@@ -1,4 +1,4 @@
-// What the files of the Python module share.
+// Shared by the files of the Python module.
 #pragma once
 #include <pybind11/eigen.h>
 #include <pybind11/numpy.h>

@@ -36,7 +36,7 @@ std::string text_of(const std::optional<Remark>& remark) {
   return remark ? remark->text : std::string();
 }
 
-/// What a call of fit() asks for, as keywords of Python.
+/// Arguments of fit(), as keywords of Python.
 struct FitRequest {
   std::vector<std::string> files;
   std::optional<std::string> law;
@@ -73,7 +73,7 @@ ImportOptions import_of(const py::dict& said) {
   return import;
 }
 
-/// What came of it. `selection` is empty for a configuration.
+/// Result of a fit. `selection` is empty for a configuration.
 class Fit {
  public:
   Fit(FitResult fit, std::optional<Selection> selection,
@@ -137,7 +137,7 @@ class Fit {
     }
     return fitted_law(fit_);
   }
-  /// What a reader must know of a prediction, in the words of tpm predict.
+  /// Limits of a prediction, in the words of tpm predict.
   [[nodiscard]] std::vector<std::string> flags_of(const Protocol& protocol,
                                                   std::span<const double> times_s,
                                                   const std::vector<double>& values,

@@ -63,7 +63,7 @@ PYBIND11_MODULE(_core, module) {
   module.attr("__version__") = std::string(tpm::version());
   bind_errors(module);
   bind_warnings();
-  // What was read once is not written over, as in the program (docs/python.md).
+  // Files that were read once are not overwritten, as in the program (docs/python.md).
   static const tpm::files::FileRoles roles("another name for the result");
   module.def(
       "parse_quantity",

@@ -37,7 +37,7 @@ using ShapeValues = std::array<double, kMostShapeParameters>;
 ///   - strictly increasing, so that its integral P is convex and the bond stores energy.
 ///
 /// Shapes are immutable. Each file of shapes/ defines one or several, and the build lists them
-/// (docs/architecture.md, "A material").
+/// (docs/adding.md, "A material").
 class ElongationShape {
  public:
   struct Entry {

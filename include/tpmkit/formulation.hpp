@@ -84,7 +84,7 @@ inline constexpr std::array<CapabilityEntry, 21> kCapabilities{{
 /// - LoopMaker (haptics/session/loop_maker.hpp), asked by sessions: the model that the servo loop
 /// steps.
 ///
-/// Formulations are immutable (docs/architecture.md, "A formulation").
+/// Formulations are immutable (docs/adding.md, "A formulation").
 class Formulation {
  public:
   /// Entry of a formulation in a list.

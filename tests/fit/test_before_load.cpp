@@ -6,6 +6,7 @@
 #include <functional>
 #include <vector>
 
+#include "one_law.hpp"
 #include "tpm/base/random.hpp"
 #include "tpm/fit/adequacy.hpp"
 #include "tpm/fit/likelihood/load_imposed.hpp"
@@ -55,14 +56,8 @@ double approach_and_ramp(double t) {
 }
 
 Selection selected_before_load(Recording r) {
-  SelectionOptions options;
-  options.laws = {parse_law_name("linear-1", "test")};
-  options.only_listed = true;
-  options.held_out = false;
-  options.setup.starts = 8;
-  options.setup.profiles = false;
-  const PreparedRecording one = prepare_recording("made.csv", std::move(r));
-  return select_law(std::span(&one, 1), options);
+  return test::select_one("linear-1", prepare_recording("made.csv", std::move(r)),
+                          test::setup_of(8, false));
 }
 
 const FitResult& chosen_of(const Selection& s) {

@@ -6,6 +6,7 @@
 #include <cmath>
 #include <functional>
 
+#include "one_law.hpp"
 #include "tpm/base/random.hpp"
 #include "tpm/fit/recording/placement.hpp"
 #include "tpm/fit/recording/unseen_rises.hpp"
@@ -51,13 +52,7 @@ double ramp_of_two_seconds(double t) {
 }
 
 Selection selected_of_channels(const PreparedRecording& recording) {
-  SelectionOptions options;
-  options.laws = {parse_law_name("linear-1", "test")};
-  options.only_listed = true;
-  options.held_out = false;
-  options.setup.starts = 8;
-  options.setup.profiles = false;
-  return select_law(std::span(&recording, 1), options);
+  return test::select_one("linear-1", recording, test::setup_of(8, false));
 }
 
 LawAdequacy adequacy_with(ChannelFault fault, double time_s) {

@@ -12,7 +12,7 @@ namespace {
 
 using Catch::Matchers::Contains;
 
-Json record_of(double stiffer, const CredibilityWords& words = {}) {
+Json record_of(double stiffer, const CredibilitySummary& summary = {}) {
   Random random(3);
   test::StudyNoise noise;
   noise.sigma_N = 2e-4;
@@ -24,7 +24,7 @@ Json record_of(double stiffer, const CredibilityWords& words = {}) {
   request.recordings = {prepare_recording(
       "other.csv",
       test::study_recording(test::study_validation(200, 0.0), noise, random, stiffer))};
-  return credibility_record(request, validate(request), words, Json::object());
+  return credibility_record(request, validate(request), summary, Json::object());
 }
 
 }  // namespace

@@ -5,6 +5,7 @@
 #include <catch2/catch.hpp>
 
 #include "adequacy_studies.hpp"
+#include "one_law.hpp"
 #include "placed_recordings.hpp"
 #include "support/remarks.hpp"
 #include "temp_folder.hpp"
@@ -32,13 +33,7 @@ using test::Defect;
 namespace {
 
 Selection selected_law(const char* law, const PreparedRecording& recording, bool profiles = false) {
-  SelectionOptions options;
-  options.laws = {parse_law_name(law, "test")};
-  options.only_listed = true;
-  options.held_out = false;
-  options.setup.starts = 4;
-  options.setup.profiles = profiles;
-  return select_law(std::span(&recording, 1), options);
+  return test::select_one(law, recording, test::setup_of(4, profiles));
 }
 
 Selection selected_linear_1(const PreparedRecording& recording) {

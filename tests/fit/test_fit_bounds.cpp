@@ -6,6 +6,7 @@
 #include <cmath>
 #include <optional>
 
+#include "one_law.hpp"
 #include "support/creep_recordings.hpp"
 #include "support/remarks.hpp"
 #include "tpm/base/random.hpp"
@@ -141,12 +142,7 @@ TEST_CASE("Verdicts that depend on a nuisance parameter on its bound are conditi
                  Contains("note: contact is on its lower bound -6 mm: what is said of k_inf"));
   CHECK_THAT(recording_figure(fit, 0).caption, Contains("presses on a bound of contact (-6 mm)"));
 
-  const std::vector<PreparedRecording> one{r};
-  SelectionOptions options;
-  options.laws = {parse_law_name("power-1", "test")};
-  options.only_listed = true;
-  options.held_out = false;
-  const Selection s = select_law(one, options);
+  const Selection s = test::select_one("power-1", r);
   CHECK_FALSE(s.candidates.front().identified);
   CHECK_THAT(s.candidates.front().reason, Contains("contact ends at its lower bound, and k_inf"));
 }

@@ -5,6 +5,7 @@
 #include <string>
 #include <vector>
 
+#include "one_law.hpp"
 #include "tpm/base/random.hpp"
 #include "tpm/fit/select/recording_setup.hpp"
 #include "tpm/fit/select/selection.hpp"
@@ -47,14 +48,9 @@ Recording in_contact(const std::string& law, const std::vector<double>& values,
 
 FitResult fit_in_units(const std::string& law, const std::vector<double>& values,
                        const Powers& powers) {
-  SelectionOptions options;
-  options.laws = {parse_law_name(law, "test")};
-  options.only_listed = true;
-  options.held_out = false;
-  const std::vector<PreparedRecording> one{
-      prepare_recording("one.csv", in_contact(law, values, powers))};
-  const Selection s = select_law(one, options);
-  return s.candidates.front().fit;
+  return test::select_one(law, prepare_recording("one.csv", in_contact(law, values, powers)))
+      .candidates.front()
+      .fit;
 }
 
 double factor_of(const FitParameter& p, const Powers& powers) {

@@ -4,6 +4,7 @@
 #include <catch2/catch.hpp>
 #include <cmath>
 
+#include "one_law.hpp"
 #include "placed_recordings.hpp"
 #include "tpm/fit/select/selection.hpp"
 #include "tpm/fit/verdict.hpp"
@@ -19,13 +20,7 @@ using Catch::StartsWith;
 namespace {
 
 Selection selected_of(const PreparedRecording& recording, const std::string& law, bool profiles) {
-  SelectionOptions options;
-  options.laws = {parse_law_name(law, "test")};
-  options.only_listed = true;
-  options.held_out = false;
-  options.setup.starts = 4;
-  options.setup.profiles = profiles;
-  return select_law(std::span(&recording, 1), options);
+  return test::select_one(law, recording, test::setup_of(4, profiles));
 }
 
 const ParameterResult& parameter_of(const FitResult& fit, const std::string& name) {

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <fstream>
 
+#include "one_law.hpp"
 #include "support/fitted_parameter.hpp"
 #include "support/remarks.hpp"
 #include "support/temp_folder.hpp"
@@ -42,12 +43,9 @@ Recording conditioned(bool held, double tau_s = 0.7) {
 }
 
 Selection selected(const PreparedRecording& recording, std::optional<double> contact) {
-  SelectionOptions options;
-  options.laws = {parse_law_name("linear-1", "test")};
-  options.only_listed = true;
-  options.held_out = false;
-  options.setup.contact = contact;
-  return select_law(std::span(&recording, 1), options);
+  SetupOptions setup;
+  setup.contact = contact;
+  return test::select_one("linear-1", recording, setup);
 }
 
 Selection fitted(const Recording& recording, std::optional<double> contact) {

@@ -7,6 +7,7 @@
 #include <cmath>
 
 #include "fitted_parameter.hpp"
+#include "one_law.hpp"
 #include "placement_studies.hpp"
 #include "tpm/fit/fitted_law.hpp"
 #include "tpm/fit/groups/specimens.hpp"
@@ -32,13 +33,8 @@ bool is_fitted(const FitResult& fit, const std::string& name) {
 
 Selection selected_law(const PreparedRecording& recording, const std::string& law,
                        SetupOptions setup = {}) {
-  SelectionOptions options;
-  options.laws = {parse_law_name(law, "test")};
-  options.only_listed = true;
-  options.held_out = false;
-  options.setup = setup;
-  options.setup.starts = 8;
-  return select_law(std::span(&recording, 1), options);
+  setup.starts = 8;
+  return test::select_one(law, recording, setup);
 }
 
 /// The fit of one law, without profiles.

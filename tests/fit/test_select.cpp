@@ -6,6 +6,7 @@
 #include <cmath>
 #include <cstdint>
 
+#include "one_law.hpp"
 #include "support/remarks.hpp"
 #include "temp_folder.hpp"
 #include "tpm/base/random.hpp"
@@ -144,14 +145,10 @@ TEST_CASE("a written configuration warns of what the direct fit warns of", "[sel
       "instrument": {"id": "cell", "force": "1 % of reading (standard)"}})j");
   }
   RecordingFile file = read_recording_file(path, {});
-  std::vector<PreparedRecording> one{prepare_recording(path, std::move(file.recording))};
-  warn_of_rows_left_out(one.front(), file.findings);
-  take_instrument(one.front(), path);
-  SelectionOptions options;
-  options.laws = {parse_law_name("linear-2", "test")};
-  options.only_listed = true;
-  options.held_out = false;
-  const Selection s = select_law(one, options);
+  PreparedRecording one = prepare_recording(path, std::move(file.recording));
+  warn_of_rows_left_out(one, file.findings);
+  take_instrument(one, path);
+  const Selection s = test::select_one("linear-2", one);
   const FitResult& direct = s.candidates[s.recommended].fit;
   write_file(folder / "config.json", to_text(config_json(direct.config)));
   const FitResult again = fit_and_judge(read_fit_problem(folder / "config.json"));
@@ -172,11 +169,7 @@ TEST_CASE("a written configuration keeps the force at which contact was said to 
   phases.contact_response = 0.2 * *std::ranges::max_element(r.response);
   const PreparedRecording one = prepare_recording("r.csv", r, phases);
   REQUIRE(one.contact_held);
-  SelectionOptions options;
-  options.laws = {parse_law_name("linear-1", "test")};
-  options.only_listed = true;
-  options.held_out = false;
-  const Selection s = select_law(std::span(&one, 1), options);
+  const Selection s = test::select_one("linear-1", one);
   const FitConfig read =
       parse_fit_config(config_json(s.candidates[s.recommended].fit.config), "test");
   CHECK_THAT(read.data.front().contact_response.value(),
@@ -252,13 +245,8 @@ TEST_CASE("branches are pooled by their times, however a fit numbers them", "[se
 TEST_CASE("a depth of metres is taken for a slip of the unit", "[select]") {
   Recording r = simulated_press("linear-1", {100.0, 120.0, 3.0, 0.0, 0.0}, 6);
   for (double& depth : r.drive) depth *= 1000.0;
-  SelectionOptions options;
-  options.laws = {parse_law_name("linear-1", "test")};
-  options.only_listed = true;
-  options.held_out = false;
-  options.setup.profiles = false;
-  const std::vector<PreparedRecording> one{prepare_recording("slip.csv", r)};
-  const Selection s = select_law(one, options);
+  const Selection s =
+      test::select_one("linear-1", prepare_recording("slip.csv", r), test::setup_of(40, false));
   REQUIRE_FALSE(s.remarks.empty());
   CHECK(s.remarks.front().code == "unit_doubtful");
 }
@@ -383,12 +371,7 @@ Recording weak_branch(std::uint32_t seed) {
 TEST_CASE("the table of laws does not contradict the table of parameters", "[select]") {
   for (const std::uint32_t seed : {2U, 6U}) {
     CAPTURE(seed);
-    SelectionOptions options;
-    options.laws = {parse_law_name("power-1", "test")};
-    options.only_listed = true;
-    options.held_out = false;
-    const std::vector<PreparedRecording> one{prepare_recording("r.csv", weak_branch(seed))};
-    const Selection s = select_law(one, options);
+    const Selection s = test::select_one("power-1", prepare_recording("r.csv", weak_branch(seed)));
     const Candidate& c = s.candidates.front();
     const auto k1 = std::find_if(c.fit.parameters.begin(), c.fit.parameters.end(),
                                  [](const auto& p) { return p.parameter.name == "k1"; });

@@ -11,6 +11,7 @@
 #include <thread>
 
 #include "hil_scenes.hpp"
+#include "made_check.hpp"
 #include "refusal.hpp"
 #include "temp_folder.hpp"
 #include "tpm/files/file.hpp"
@@ -114,9 +115,7 @@ TEST_CASE("A check in which a cycle hangs counts the cycles before it") {
 
 TEST_CASE("Of a loop whose first cycle hung nothing is counted, and nothing is said of stalls",
           "[untimed]") {
-  JitterCheck check;
-  check.rate_Hz = 1000.0;
-  check.watchdog_s = check.cycle_timeout_s = 0.008;
+  JitterCheck check = test::made_check();
   check.outcome.cause = StopCause::cycle_timeout;
   assess(check);
   CHECK(check.timing == "not kept: the test ended early: cycle timeout");
@@ -181,14 +180,8 @@ TEST_CASE("A check says to a session what its run says") {
 }
 
 TEST_CASE("Text and JSON of a check say the same of time and session") {
-  JitterCheck check;
-  check.rate_Hz = 1000.0;
-  check.watchdog_s = check.cycle_timeout_s = 0.008;
-  check.late_limit = 100;
-  check.missed_limit = 50;
-  check.outcome.cause = StopCause::finished;
-  check.outcome.cycles = 60'000;
-  for (int i = 0; i < 60'000; ++i) check.outcome.woke_late.note(19'500);
+  JitterCheck check = test::made_check();
+  test::add_cycles(check, 60'000, 19'500);
   assess(check);
   CHECK_THAT(check_text(check), Contains("session: none was named"));
   CHECK(check_json(check).at("session").is_null());
@@ -206,14 +199,8 @@ TEST_CASE("Text and JSON of a check say the same of time and session") {
 }
 
 TEST_CASE("The answer of a check has 25 lines at most, its verdicts first") {
-  JitterCheck check;
-  check.rate_Hz = 1000.0;
-  check.watchdog_s = check.cycle_timeout_s = 0.008;
-  check.late_limit = 100;
-  check.missed_limit = 50;
-  check.outcome.cause = StopCause::finished;
-  check.outcome.cycles = 14;
-  for (int power = 0; power < 14; ++power) check.outcome.woke_late.note(1'000LL << power);
+  JitterCheck check = test::made_check();
+  for (int power = 0; power < 14; ++power) test::add_cycles(check, 1, 1'000LL << power);
   check.findings.push_back({"told", "something that the device tells"});
   assess(check);
   check.session = ask_session_gate(test::parsed(test::short_session()), device_without_a_file(),

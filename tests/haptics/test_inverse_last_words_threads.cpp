@@ -12,6 +12,7 @@
 #include <vector>
 
 #include "inverse_sessions.hpp"
+#include "made_check.hpp"
 #include "tpm/base/remark.hpp"
 #include "tpm/haptics/loop/empty_space.hpp"
 #include "tpm/haptics/loop/servo_step.hpp"
@@ -202,13 +203,8 @@ TEST_CASE("A lost connection is completed after the loop, and old positions are 
 }
 
 TEST_CASE("A check that the device ended quotes it, and does not blame the machine") {
-  JitterCheck check;
-  check.rate_Hz = 500.0;
-  check.watchdog_s = check.cycle_timeout_s = 0.016;
-  check.late_limit = 100;
-  check.missed_limit = 50;
-  check.outcome.cycles = 30;
-  for (int i = 0; i < 30; ++i) check.outcome.woke_late.note(20'000);
+  JitterCheck check = test::made_check(500.0);
+  test::add_cycles(check, 30, 20'000);
   check.outcome.cause = StopCause::communication;
   check.outcome.detail = "positions older than 20 ms";
   check.outcome.device.error = 1;

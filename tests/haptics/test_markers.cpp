@@ -9,6 +9,7 @@
 #include <memory>
 
 #include "hil_scenes.hpp"
+#include "made_check.hpp"
 #include "temp_folder.hpp"
 #include "tpm/haptics/device/virtual_omega7.hpp"
 #include "tpm/haptics/loop/servo_step.hpp"
@@ -192,18 +193,11 @@ TEST_CASE("A session whose largest force no hand feels says so, in text and in J
 
 /// A check of 60 s at 1 kHz: nearly all wake-ups 20 us late, some and a few later.
 JitterCheck check_with(int some, std::int64_t some_ns, int few, std::int64_t few_ns) {
-  JitterCheck check;
-  check.rate_Hz = 1000.0;
+  JitterCheck check = test::made_check();
   check.duration_s = 60.0;
-  check.watchdog_s = check.cycle_timeout_s = 0.008;
-  check.late_limit = 100;
-  check.missed_limit = 50;
-  ServoOutcome& o = check.outcome;
-  o.cause = StopCause::finished;
-  o.cycles = 60'000;
-  for (int i = 0; i < 60'000 - some - few; ++i) o.woke_late.note(19'500);
-  for (int i = 0; i < some; ++i) o.woke_late.note(some_ns);
-  for (int i = 0; i < few; ++i) o.woke_late.note(few_ns);
+  test::add_cycles(check, 60'000 - some - few, 19'500);
+  test::add_cycles(check, some, some_ns);
+  test::add_cycles(check, few, few_ns);
   assess(check);
   return check;
 }

@@ -9,7 +9,7 @@
 - every script, configuration, test and example that a page names is there, and every program of the tests that it runs
   is made. The commands of reports are not run: they measure;
 - docs/README.md links every page of docs, docs/site and reports, and the site's start lists every page of docs once;
-- docs has at most 35 pages beside those of docs/site, and reports at most 16, one in each folder: MOST;
+- docs has at most 36 pages beside those of docs/site, and reports at most 16, one in each folder: MOST;
 - three questions, as a new user types them, are answered two links from README.md at most: QUESTIONS;
 - paper/paper.md shows every figure of paper/figures, cites every entry of paper/paper.bib and nothing else, and names
   only files that exist;
@@ -33,7 +33,7 @@ MADE = "docs/site/reference/"
 
 # Written by `tpm paper report` beside tables.csv; the page is report.md.
 TABLES = "reports/paper/tables.md"
-MOST = {"docs": 35, "docs/site": 6, "reports": 16}
+MOST = {"docs": 36, "docs/site": 6, "reports": 16}
 # What is typed; a pattern for the link in docs/README.md; one for what stands below the heading that it leads to.
 QUESTIONS = {
     "my fit says flat": (r"fit says flat", r"`flat`.*`tpm design`"),

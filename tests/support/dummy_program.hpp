@@ -1,5 +1,5 @@
 #pragma once
-// The program that is linked with the worked examples of docs/architecture.md.
+// The program that is linked with the worked examples of docs/adding.md.
 #include <sys/wait.h>
 
 #include <algorithm>

@@ -49,7 +49,7 @@ inline std::vector<ErrorCase> validation_error_cases() {
   const std::string command = "validate {}/l.json {}/r.csv";
   const std::string recheck = "validate --recheck {}/p.html";
   const std::string whole =
-      R"({"tpm": "1", "words": {"question": "", "context": "", "risk": ""}, "files": {},
+      R"({"tpm": "1", "summary": {"question": "", "context": "", "risk": ""}, "files": {},
 "evidence": [], "law": {}, "validation": {}, "invocation": )";
   const auto fitted = [law, fit](const std::string& recording) {
     return with_files({{"l.json", law(fit)}, {"r.csv", recording}});
@@ -148,7 +148,7 @@ inline std::vector<ErrorCase> validation_error_cases() {
       {type, "no page", recheck, with_files({{"p.html", "<html></html>"}})},
       {type, "missing page", recheck, with_files({})},
       {type, "page whose record is no JSON", recheck, page("{\"tpm\": ")},
-      {type, "page of an older format", recheck, page(R"({"tpm": "1", "words": {}})")},
+      {type, "page of an older format", recheck, page(R"({"tpm": "1", "summary": {}})")},
       {type, "page whose invocation is damaged", recheck, page(whole + "{\"law\": 3}}")},
       {type, "page whose law is gone", recheck,
        page(whole + R"({"law": "{}/gone.json", "recordings": ["r.csv"], "reading": {}, "units": [],

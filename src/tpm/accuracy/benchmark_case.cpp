@@ -119,7 +119,7 @@ std::vector<BenchmarkSetting> rule_settings(const std::shared_ptr<const MethodPr
 
 namespace {
 
-/// What a formulation throws where it cannot go on is an outcome here.
+/// Outcome of a run whose formulation gave up with this error.
 MethodRun failed_run(const Error& error) {
   MethodRun run;
   const bool lost =

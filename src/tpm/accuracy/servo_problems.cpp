@@ -85,7 +85,7 @@ class ServoCase {
     if (!reference_) find_reference();
     return *reference_;
   }
-  /// What a setting at a relaxation time answers.
+  /// Response of a setting at a relaxation time.
   [[nodiscard]] AnsweredPart part(std::size_t tau, bool positions) const {
     return positions ? positions_[tau] : forces_[tau];
   }
@@ -133,8 +133,8 @@ class ServoCase {
     const auto substeps = [&](double longest) {
       return std::max(1, static_cast<int>(std::ceil(x / longest)));
     };
-    // What a kink leaves dies within a few relaxation times, so its share of a period is what has
-    // to be resolved; slower tissue needs no more than a step a period.
+    // The effect of a kink decays within a few relaxation times, so its share of a period has to be
+    // resolved; slower tissue needs no more than a step a period.
     constexpr double kLongestLinear = 5.0;
     constexpr double kLongestStage = 1.25;
     ContactReference fine = fine_reference(touched, motion, substeps(kLongestLinear), kFieldEvery);

@@ -191,8 +191,7 @@ constexpr auto kDimensions = std::to_array<PhysicalDimension>({
 
 constexpr std::string_view kAnyBlank = " \t\r\n";
 
-/// What people write beside plain letters, as plain letters: "\u00B5m" is "um", "s\u207B\u00B9" is
-/// "s^-1".
+/// Symbols beside plain letters as plain letters: "\u00B5m" is "um", "s\u207B\u00B9" is "s^-1".
 std::string plain_letters(std::string_view text) {
   constexpr auto kWritten = std::to_array<std::pair<std::string_view, std::string_view>>({
       {"\xC2\xB5", "u"},      // micro sign

@@ -72,7 +72,7 @@ Positions PushedContact::at(const Eigen::Vector3d& displacement_m, double relaxe
                                    relaxed};
   double done = 0.0;
   double stride = kStride_m;
-  // What is free goes on as it went over the stride before.
+  // Free spheres continue their motion of the stride before.
   Positions before = here.position;
   double went = 0.0;
   while (done < way) {

@@ -57,13 +57,13 @@ double cubic_of(const BondSystem& bonds, std::size_t bond) {
   return (bonds.stiffness()[row] - bonds.relaxing()[row]) * sum;
 }
 
-/// What a sweep adds up.
+/// Forces that a sweep adds up: those of this step, of the next one, or both.
 enum class Sweep { both, now, next };
 
 struct ServoBondKernels {
   using Group = ServoBonds::Group;
 
-  /// What a group's viscous elongations move on with.
+  /// Factors that advance a group's viscous elongations.
   struct Step {
     const ServoWeights& weights;
     std::size_t latest;
@@ -156,7 +156,7 @@ struct ServoBondKernels {
   /// waits for is hidden behind the others.
   static constexpr std::size_t kTogether = 16;
 
-  /// What is known of a group between its steps.
+  /// State of a group between its steps.
   struct Spans {
     __m256 x, y, z;         ///< from end to end
     __m256 square, change;  ///< of its length, and against that at rest

@@ -16,7 +16,7 @@ namespace tpm::contact {
 namespace {
 
 constexpr double kFieldStride_m = 2e-3;
-/// How far the fields in use may be from the true ones, beside the distance from the normal, m.
+/// Largest error of the fields in use beside the distance from the normal, m.
 constexpr double kFieldSlack_m = 0.3e-3;
 constexpr double kHold = 0.7;              // of an error, from one step to the next
 constexpr double kValidServoError = 0.02;  // error over the largest force

@@ -7,8 +7,10 @@
 namespace tpm::files {
 
 DocumentPlace DocumentPlace::key(std::string_view name) const {
-  return {where.find(": key ") == std::string::npos ? fmt::format("{}: key /{}", where, name)
-                                                    : fmt::format("{}/{}", where, name)};
+  DocumentPlace place;
+  place.where = fmt::format("{}{}{}", where, below_key ? "/" : ": key /", name);
+  place.below_key = true;
+  return place;
 }
 
 double quantity_of(const Json& value, Dimension dimension, std::string_view where) {

@@ -1,4 +1,5 @@
 #pragma once
+#include <concepts>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -8,10 +9,17 @@
 
 namespace tpm::files {
 
-/// A place in a document, for messages: "FILE: key /a/b".
+/// A place in a document, for messages: "FILE", or "FILE: key /a/b" below a key.
 struct DocumentPlace {
-  std::string where;
+  DocumentPlace() = default;
+  /// The whole document.
+  /// @param file its name, or another one; not the `where` of a place below a key
+  template <std::convertible_to<std::string_view> Text>
+  DocumentPlace(const Text& file) : where(std::string_view(file)) {}
   [[nodiscard]] DocumentPlace key(std::string_view name) const;
+
+  std::string where;
+  bool below_key = false;
 };
 
 /// A text of a number and a unit, SI; or a number, which is SI already: schemas let files say texts

@@ -23,7 +23,7 @@ std::string limit_expected(std::string_view own) {
       own, own == "reading" ? ", \"0.1 % of range\"" : "");
 }
 
-/// What the limit is divided by, and the text without saying so.
+/// Divisor of the limit; removes its words from the text.
 double divisor_of(std::string_view& text, std::string_view where, std::string_view own) {
   text = trimmed(text);
   if (!text.ends_with(')')) return std::numbers::sqrt3;

@@ -171,7 +171,7 @@ std::optional<double> value_in(std::string_view field, const WrittenNumber& numb
   return find_number(plain);
 }
 
-/// What the numbers of one column tell.
+/// Evidence of one column's numbers.
 struct ColumnEvidence {
   const StyledColumn* column = nullptr;
   std::array<std::size_t, 2> sure{};    ///< numbers that only a decimal point, or comma, explains
@@ -214,7 +214,7 @@ ColumnEvidence evidence_of(const StyledColumn& column) {
   return found;
 }
 
-/// How far a curve runs up and down, as a multiple of its range.
+/// Total variation of a curve as a multiple of its range.
 double roughness(const StyledColumn& column, bool decimal_comma) {
   double path = 0.0, low = 0.0, high = 0.0, before = 0.0;
   bool first = true;
@@ -234,7 +234,7 @@ double roughness(const StyledColumn& column, bool decimal_comma) {
   return high > low ? path / (high - low) : 0.0;
 }
 
-/// Whether the mark of an open column is its decimal sign; none if both readings are as likely.
+/// True if the mark of an open column is its decimal sign; empty if both readings are as likely.
 std::optional<bool> mark_is_decimal(const ColumnEvidence& column) {
   if (column.large) return true;  // 1000 stands there without a mark
   // Only numbers below 1000 beside marked ones can tell the readings apart.

@@ -13,7 +13,7 @@ constexpr const char* kAttribute = "user.tpm.origin";
 /// Names and values of all attributes of a file share a block of 4 kB on most file systems.
 constexpr std::size_t kLongestOrigin = 3000;
 
-/// What tells a changed content from the marked one without reading it.
+/// Mark that tells changed content from the marked one without reading it.
 std::string content_of(const struct stat& file) {
   return fmt::format("{} {}.{:09}", file.st_size, file.st_mtim.tv_sec, file.st_mtim.tv_nsec);
 }

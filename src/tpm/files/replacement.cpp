@@ -22,8 +22,8 @@ namespace fs = std::filesystem;
 constexpr std::size_t kLongestName = 255;  // bytes; of all usual file systems
 constexpr std::size_t kRoomForEnding = 24;
 
-/// What all temporary files for a target begin with. A long name is not repeated: there would be no
-/// room for the ending.
+/// Prefix of all temporary files for a target. A long name is not repeated: there would be no room
+/// for the ending.
 std::string temporary_beginning(const fs::path& target) {
   const std::string name = target.filename().string();
   if (name.size() + kRoomForEnding <= kLongestName) return name + ".part.";

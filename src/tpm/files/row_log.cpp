@@ -57,7 +57,7 @@ class Cursor {
   [[nodiscard]] std::size_t at() const { return at_; }
   void go_to(std::size_t at) { at_ = at; }
   [[nodiscard]] std::size_t left() const { return bytes_.size() - at_; }
-  /// What is left is enough for the text that begins here.
+  /// True if the remaining bytes hold the text that begins here.
   [[nodiscard]] bool holds_text() const {
     Cursor ahead = *this;
     std::uint32_t size = 0;
@@ -215,7 +215,7 @@ void read_rows(Cursor& cursor, RowLog& log) {
 
 RowLog read_row_log(const std::filesystem::path& path) {
   constexpr std::uint64_t kMost = std::uint64_t{1} << 36U;  // a working day at 4 kHz
-  // What is no file may have no end.
+  // A source that is no regular file may have no end.
   std::error_code ec;
   const std::string bytes =
       std::filesystem::is_regular_file(path, ec) ? read_file(path, kMost) : read_file(path);

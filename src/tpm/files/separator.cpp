@@ -45,7 +45,7 @@ std::vector<std::string_view> sampled_lines(std::string_view text) {
   return sample;
 }
 
-/// What stands between quotes, or the field itself.
+/// Text between quotes, or the field itself.
 std::string_view without_quotes(std::string_view field) noexcept {
   const bool quoted = field.size() > 1 && field.front() == '"' && field.back() == '"';
   return quoted ? trimmed(field.substr(1, field.size() - 2)) : field;

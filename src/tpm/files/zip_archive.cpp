@@ -13,7 +13,7 @@
 namespace tpm::files {
 namespace {
 
-/// What minizip reads instead of a file.
+/// Bytes that minizip reads in place of a file.
 struct MemoryStream {
   std::string_view bytes;
   std::uint64_t at = 0;

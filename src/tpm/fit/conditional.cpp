@@ -87,7 +87,7 @@ bool root_beyond_bound(const FitResult& result, const ResidualFunction& function
   return function.information_root(natural, root);
 }
 
-/// Which parameters a held one decides for: d theta_i / d theta_held times the width of its bounds,
+/// Parameters that depend on a held one: |d theta_i / d theta_held| times the width of its bounds,
 /// against the standard error of theta_i.
 std::vector<bool> dependents(const FitResult& result, const ResidualFunction& function,
                              LimitingBound bound) {

@@ -27,7 +27,7 @@ struct Approach {
   StartKind kind;
 };
 
-/// What a search with a stand-in for the function finds; no profiles.
+/// Result of a search with a stand-in for the function; no profiles.
 FitResult survey(const ExperimentResiduals& stand_in, std::span<const FitParameter> parameters) {
   Threshold threshold;
   threshold.scale_known = stand_in.config().scale_known();

@@ -117,7 +117,7 @@ int flag_clipping(FitResult& result) {
   return all;
 }
 
-/// What an organ follows of a measured motion.
+/// Flags how closely an organ follows a measured motion.
 void flag_motions(FitResult& result, const ExperimentResiduals& function) {
   for (const Experiment& e : function.experiments()) {
     const auto* course = std::get_if<TimeCourse>(&e.imposed);

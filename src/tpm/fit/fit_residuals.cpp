@@ -91,7 +91,7 @@ std::optional<double> natural_standard_error(const FitResult& result, std::size_
          std::abs(p.natural_slope(p.theta(result.best.natural[index])));
 }
 
-/// What lies below the threshold belongs to every interval. A profile that lay in another valley
+/// Points below the threshold belong to every interval. A profile that lay in another valley
 /// may thus show a point beyond the limit of this one: the furthest on either side.
 /// @param rise of the deviance at the limits of this parameter
 std::vector<Minimum> beyond_limits(const FitResult& result, std::size_t index, double rise) {

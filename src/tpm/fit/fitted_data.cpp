@@ -142,7 +142,7 @@ void add_band(RecordingFit& fit, const Experiment& experiment, const PredictionB
   if (fitted > 0) fit.share_inside = static_cast<double>(inside) / fitted;
 }
 
-/// What is said of one recording beside its curve.
+/// Describes one recording beside its curve.
 void describe_recording(RecordingFit& fit, const Experiment& experiment,
                         const std::optional<PredictionBands>& bands) {
   if (bands) add_band(fit, experiment, *bands);

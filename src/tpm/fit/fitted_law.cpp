@@ -10,7 +10,7 @@
 namespace tpm::fit {
 namespace {
 
-/// What a law has been asked about: the largest depth beyond the contact point, and for how long.
+/// Range over which a law was fitted: the largest depth beyond the contact point, and the time.
 struct FittedRange {
   double depth = 0.0;  ///< of readings without a history: the deepest
   double duration_s = 0.0;

@@ -61,7 +61,7 @@ class NearSearch {
   const FixedMask& fixed_;
   std::vector<Eigen::Index> linear_, curved_;
   ThetaPoint here_, next_;
-  /// What J' J leaves out of the curvature of half the sum of squares: r times second derivatives.
+  /// Part of the curvature of half the sum of squares beside J' J: r times second derivatives.
   Eigen::MatrixXd missing_;
   double damping_ = kFirstDamping;
   int iterations_ = 0;

@@ -22,7 +22,7 @@ bool may_have_outliers(const FitConfig& config) {
   });
 }
 
-/// What was read of one recording and how far it lies from the curve.
+/// Readings of one recording and their distances from the curve.
 struct CurveDistance {
   std::vector<std::size_t> data;
   std::vector<double> reading, sigma, distance;

@@ -149,7 +149,7 @@ class ProfileWalk {
     fixed_[index] = true;
   }
 
-  /// How the walk ended; theta of the limit if it is one.
+  /// End of the walk; theta of the limit if it is one.
   struct End {
     ProfileEnd how;
     double theta;
@@ -254,7 +254,7 @@ class ProfileWalk {
     return m;
   }
 
-  /// Which other parameters stand on a bound at the last point within the limit.
+  /// Notes the other parameters on a bound at the last point within the limit.
   void note_bounds(const std::vector<double>& natural, Profile& profile) const {
     for (std::size_t j = 0; j < natural.size(); ++j) {
       const bool upper = parameters_[j].at_upper(natural[j]);

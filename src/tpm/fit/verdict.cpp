@@ -282,7 +282,7 @@ NamedDirection named_direction(const FitResult& result) {
   const bool pure = std::ranges::all_of(
       c.free, [&](std::size_t i) { return result.parameters[i].parameter.scale != Scale::linear; });
   const Eigen::VectorXd& weight = pure || c.weakest_share.size() != v.size() ? v : c.weakest_share;
-  // What moves by less than this share of the largest is not worth a word.
+  // Contributions below this share of the largest are not listed.
   const double least = 0.2 * weight.cwiseAbs().maxCoeff();
   NamedDirection named;
   for (Eigen::Index k = 0; k < v.size(); ++k) {

@@ -164,7 +164,7 @@ void ContactHistory::update_weights(double h, double time_scale, bool curved) {
 void ContactHistory::set_line_weights(double h) {
   StepWeights& k = weights_;
   const Eigen::ArrayXd z = h * law_.relaxation.rate_per_s.array();
-  // What is below rounding becomes 0: products with denormal numbers are slow.
+  // Values below rounding become 0: products with denormal numbers are slow.
   k.r = (z < 60.0).select((-z).exp(), 0.0);
   // 1 - (1 - r)/z, below 0.1 as z/2! - z^2/3! + ..., where it would cancel
   Eigen::ArrayXd series = Eigen::ArrayXd::Zero(z.size());

@@ -66,7 +66,7 @@ class EdgeFinder {
     for (const Knot& part : parts(to)) step(part);
   }
 
-  /// What is met from here on belongs to a contact that has been larger.
+  /// Ends the growth: the parts met from here on belong to a contact that has been larger.
   void end_growth() {
     place_ = growth_.size() - 1;
     least_ = largest_;

@@ -34,7 +34,7 @@ void require_frequencies(std::span<const double> frequency_Hz) {
   }
 }
 
-/// What the depth of operation makes of G*: K* = kernel.slope G* + k_tension tension.slope.
+/// Effect of the operating depth on G*: K* = kernel.slope G* + k_tension tension.slope.
 struct Operation {
   KernelShape::Tangent kernel;
   TensionShape::Tangent tension;

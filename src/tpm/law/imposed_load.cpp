@@ -106,7 +106,7 @@ LoadedSurface::LoadedSurface(const LawAtParameters& law, Want want)
   eigenvector_ = orthogonal_columns(f);
   eigenvalue_ = -f.colwise().squaredNorm().transpose();
   weight_ = eigenvector_.transpose() * q_;
-  // What has no plateau flows: rounding must not make it relax.
+  // A law without a plateau flows: rounding must not make it relax.
   if (n > 0 && law.relaxation.constant == 0.0) {
     Eigen::Index slowest = 0;
     eigenvalue_.maxCoeff(&slowest);

@@ -32,7 +32,7 @@ const ChebyshevPoints& chebyshev_points() {
   return points;
 }
 
-/// What the values at the nodes count at x; they sum to 1.
+/// Weights of the values at the nodes at x; they sum to 1.
 std::array<double, kNodes> shares_at(double x) {
   const ChebyshevPoints& points = chebyshev_points();
   std::array<double, kNodes> share{};

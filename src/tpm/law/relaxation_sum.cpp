@@ -65,7 +65,7 @@ RelaxationSum branch_relaxation(bool solid, int branches, std::span<const double
 
 namespace {
 
-/// What a parameter changes in the coefficients on the grid.
+/// Derivative of the coefficients on the grid by a parameter.
 struct GridColumn {
   int parameter;
   double scale;

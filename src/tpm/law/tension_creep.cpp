@@ -18,7 +18,7 @@ constexpr double kLeastCreepStep = 1e-20;  // of the time that is asked for
 using NodeVector = Eigen::Matrix<double, kCreepNodes, 1>;
 using NodeMatrix = Eigen::Matrix<double, kCreepNodes, kCreepNodes>;
 
-/// How much longer the next step is: the error grows with the power kCreepNodes + 1.
+/// Factor of the next step's length: the error grows with the power kCreepNodes + 1.
 double longer_creep_step(double off) {
   constexpr double kLeast = 0.1;
   constexpr double kMost = 8.0;
@@ -177,7 +177,7 @@ bool CreepSteps::find_depths() {
   return false;
 }
 
-/// How far V between the nodes is from what balances there, at most. A force that is missing there
+/// Largest error of V between the nodes against equilibrium there. A force that is missing there
 /// moves V by it over the stiffness that a part of the step leaves: that at once would be far
 /// larger for a spring-pot.
 double CreepSteps::off_balance() const {

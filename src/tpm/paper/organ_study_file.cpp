@@ -15,7 +15,7 @@ namespace {
 
 using Kind = ProtocolChoice::Kind;
 
-/// What stands under a key of tpm fit, whose reader reads it.
+/// Value of a key of tpm fit, whose reader reads it.
 ValueType<Json> of_fit(Form::Type type, std::size_t fewest = 0) {
   ValueType<Json> read = any("as of tpm fit");
   Form form{.type = type, .fewest = fewest, .item = read.form};
@@ -229,7 +229,7 @@ std::vector<StudyFit> fits_of(const StudyKeys& study, const DocumentPlace& place
   return fits;
 }
 
-/// What a material holds, checked as a hypothesis of the fit is.
+/// Parameters that a material fixes, checked as a hypothesis of the fit is.
 Hypothesis fixed_of(const MaterialKeys& material, const FitConfig& config,
                     const DocumentPlace& place) {
   Hypothesis fixed{material.name, {}};

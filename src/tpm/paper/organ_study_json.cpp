@@ -50,7 +50,7 @@ Json fits_json(const OrganStudy& study) {
   });
 }
 
-/// What was imposed, under keys with units.
+/// The imposed condition, under keys with units.
 Json condition_json(const StudyCondition& c) {
   Json j{{"experiment", protocol_kind_name(c.kind)}};
   if (c.kind == Kind::creep) {

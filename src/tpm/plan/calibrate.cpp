@@ -1,5 +1,5 @@
 // Declared in tpm/plan/operations.hpp.
-// How long each operation takes on this machine.
+// Measures the time of each operation on this machine.
 #include <algorithm>
 #include <chrono>
 #include <cmath>

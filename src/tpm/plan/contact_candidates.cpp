@@ -119,7 +119,7 @@ OperationCount counted(const BalanceWork& work) {
       .add(Operation::panel_product, static_cast<double>(work.products));
 }
 
-/// What is common to them.
+/// Common part of these candidates.
 class ContactCandidate : public PlanModel {
  public:
   [[nodiscard]] std::optional<std::string> why_not(const PlanSurrogate& surrogate,

@@ -19,7 +19,7 @@ constexpr int kTimes = 21, kMostTried = 31;
 constexpr double kPerDecade = 8.0;
 constexpr double kBeyond = 30.0;  // rates beyond the relaxation times, as a factor
 
-/// What remains of a branch's stiffness at a rate.
+/// Remaining share of a branch's stiffness at a rate.
 double remaining(double per_rate_s, double time_s) {
   return time_s / (time_s + per_rate_s);
 }

@@ -153,7 +153,7 @@ struct Kink {
   std::size_t group = 0;
 };
 
-/// What each group imposes, the first that of the scene.
+/// Protocols of all groups, that of the scene first.
 std::vector<const Protocol*> all_protocols(const PlanScene& scene) {
   std::vector<const Protocol*> all{&scene.protocol()};
   for (const DriveGroup& group : scene.driven().probes.loading().beside) {

@@ -20,7 +20,7 @@ namespace {
 
 constexpr double kLeastTolerance = 1e-6, kMostTolerance = 0.5;
 constexpr double kSlowest_Hz = 1.0, kFastest_Hz = 1e6;
-// What a plan may take: in parts of its reference and cross-check, and that anyway.
+// Largest time of a plan: in parts of its reference and cross-check, and that anyway.
 constexpr double kMostOfReference = 2.0, kAnyway_s = 1.5;
 /// With masses of the reference alone. Its runs cannot be cut short: what is begun below this limit
 /// ends above it.
@@ -244,7 +244,7 @@ class Planning {
                                         reference_.reference.response_difference;
   }
 
-  /// What a run says of masses goes before the estimate: there is one number.
+  /// A run's error of masses replaces the estimate: there is one number.
   void settle_masses_left_out() {
     const PlanRelevance& inertia = plan_.relevance.front();
     if (plan_.inertial || !inertia.error) return;
@@ -361,7 +361,7 @@ ExpectedPlanWork expected_work(const ExperimentScene& scene, const PlanRequest& 
 
 namespace {
 
-/// What a plan chose, with the surrogate of its scene.
+/// The choice of a plan, with the surrogate of its scene.
 struct Chosen {
   Chosen(const Plan& plan, const ExperimentScene& scene)
       : surrogate(PlanScene(scene), plan.request.measure, plan.inertial) {

@@ -35,7 +35,7 @@ class Survival {
         once_s_(std::max(least_work_of_try_s(), 1e-9)),
         most_tries_(std::max(static_cast<int>(std::ceil(search_s / once_s_)), kLeastTries)) {}
 
-  /// What breaks in a changed scene; none if nothing does.
+  /// Condition that fails in a changed scene; none if all hold.
   [[nodiscard]] std::optional<std::string> breaks(const PlanScene& scene) const {
     try {
       const PlanSurrogate changed(scene, request_.measure, surrogate_.inertial(), longest_run_s());

@@ -20,7 +20,7 @@ constexpr double kMargin = 1.02;      // of the depths of curves
 constexpr double kSame = 1.0 + 1e-9;  // tolerances that differ by rounding alone
 constexpr double kRounding = 1e-12;   // what no run shows
 
-/// How much of what can relax has done so.
+/// Relaxed share of the branches.
 enum class Relaxed { nothing, all };
 
 /// Forces at `points` even depths from 0 to `last_m`.

@@ -10,7 +10,7 @@
 namespace tpm::plan {
 namespace {
 
-/// What all of them share: a ScalarModel made for the scene and stepped over the protocol.
+/// Common part of these candidates: a ScalarModel made for the scene and stepped over the protocol.
 class ScalarCandidate : public PlanModel {
  public:
   [[nodiscard]] std::optional<std::string> why_not(const PlanSurrogate& surrogate,
@@ -76,7 +76,7 @@ Trajectory ScalarCandidate::run(const PlanSurrogate& surrogate, const PlanBudget
     const double response = run.at(times_s[i]);
     answer.response[static_cast<Eigen::Index>(i)] = response;
     if (!surrogate.wants_field()) continue;
-    // What has not relaxed yet, as a depth.
+    // The part that has not relaxed yet, as a depth.
     const ScalarModel& at = run.model();
     const double stiffness = at.relaxing().stiffness_N_per_m;
     double followed = 0.0;

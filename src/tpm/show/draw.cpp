@@ -26,7 +26,7 @@
 namespace tpm::show {
 namespace {
 
-/// What became of a program that was run.
+/// Outcome of a program that was run.
 struct Outcome {
   int status = 0;            ///< exit status; 127 if it could not be started
   std::string error_output;  ///< what it wrote to standard error

@@ -35,7 +35,7 @@ std::vector<double> summed_values(const SweepReader& sweep, const std::string& o
   return sums;
 }
 
-/// What the cell says of a parameter that sets several of the model's.
+/// The cell's value of a parameter that sets several of the model's.
 std::optional<CellParameter> found_in_cell(const BestCell& cell,
                                            const std::vector<std::string>& sets,
                                            const DocumentPlace& place) {

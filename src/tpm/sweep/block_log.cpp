@@ -27,7 +27,7 @@ constexpr std::string_view kLogMagic = "TPMSWEEP";
 constexpr std::string_view kRecordMagic = "TPMBLOCK";
 constexpr std::uint64_t kLargestRecord = std::uint64_t{1} << 32U;
 
-/// What stands before a payload.
+/// Header of a payload.
 struct RecordHead {
   char magic[8];
   std::uint64_t number;
@@ -112,7 +112,7 @@ BlockLog::BlockLog(std::filesystem::path path, const Sweep& sweep,
   }
   begin();
   find_blocks(note);
-  // What stands behind the last block was cut short: new blocks take its place.
+  // Bytes behind the last block were cut short: new blocks take their place.
   if (::ftruncate(file_.get(), static_cast<off_t>(length_)) != 0) throw cannot_write_log(path_);
 }
 

@@ -121,7 +121,7 @@ void CellRunner::run_cell(std::size_t cell, CellBlock& block) {
     if (!block.model.empty()) block.model[cell] = answer.model;
     require_finite();
   } catch (const Error& error) {
-    // What is outside (no memory for a mesh, no file) is not the cell's own.
+    // An outside cause (no memory for a mesh, no file) is not the cell's own.
     if (error.code() == ExitCode::environment) throw;
     return set_aside(cell, CellStatus::failed, error.what(), block);
   }

@@ -23,7 +23,7 @@ using Kind = SweepOutput::Kind;
 constexpr double kForever = std::numeric_limits<double>::infinity();
 constexpr double kNotGiven = std::numeric_limits<double>::quiet_NaN();
 
-/// What a cell is computed from, in the order of kContactParameters.
+/// Values that a cell is computed from, in the order of kContactParameters.
 enum ContactIndex : std::size_t { kDepth = kTpmParameterCount, kRate, kHold, kLoad, kDuration };
 constexpr std::size_t kContactParameterCount = kDuration + 1;
 using ContactValues = std::array<double, kContactParameterCount>;
@@ -51,7 +51,7 @@ constexpr std::array<ContactParameter, kContactParameterCount> kContactParameter
 
 enum class Indentation { none, ramp_hold, step_hold };
 
-/// What a sweep's document says of the star.
+/// The star in a sweep's document.
 struct ContactSetup {
   ContactValues values{};
   Indentation indentation = Indentation::none;
@@ -253,7 +253,7 @@ ContactSetup setup_of(const SweepKeys& keys, const DocumentPlace& place) {
   const auto put = [&](std::size_t index, const std::optional<double>& value, double otherwise) {
     setup.values[index] = value.value_or(otherwise);
   };
-  // What jumps may be held for ever; a ramp's hold has an end.
+  // The value after a jump may be held for ever; a ramp's hold has an end.
   if (keys.indentation) {
     const bool step = keys.indentation->kind == ProtocolKind::step_hold;
     setup.indentation = step ? Indentation::step_hold : Indentation::ramp_hold;

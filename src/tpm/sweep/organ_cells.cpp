@@ -24,7 +24,7 @@ namespace {
 
 using Kind = SweepOutput::Kind;
 
-/// What a sweep's document says of the organ.
+/// The organ in a sweep's document.
 struct OrganSetup {
   explicit OrganSetup(const Json& of_scene) : scene(of_scene) {}
 

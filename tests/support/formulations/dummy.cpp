@@ -1,4 +1,4 @@
-// The worked example of docs/architecture.md, "A formulation": one file, and nothing else.
+// The worked example of docs/adding.md, "A formulation": one file, and nothing else.
 #include "tpm/organ/balance/mass_spring.hpp"
 #include "tpm/organ/run/scene_runner.hpp"
 

@@ -1,4 +1,4 @@
-// The worked example of docs/architecture.md, "A material": one file, and nothing else.
+// The worked example of docs/adding.md, "A material": one file, and nothing else.
 #include <cmath>
 
 #include "tpmkit/elongation_function.hpp"

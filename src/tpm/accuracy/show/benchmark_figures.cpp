@@ -15,7 +15,7 @@ namespace {
 /// Longest step that a servo loop of 1 kHz can use.
 constexpr double kServoStep_s = 1e-3 * (1.0 + 1e-9);
 
-/// What a setting costs, with the quartiles where it was measured.
+/// Cost of a setting, with the quartiles where it was measured.
 struct Cost {
   double value = 0.0;
   double lower = 0.0, upper = 0.0;
@@ -24,7 +24,7 @@ struct Cost {
 /// None: the setting does not belong into the panel.
 using CostOf = std::function<std::optional<Cost>(const BenchmarkPoint&)>;
 
-/// How much time a run has simulated; one that never moved is reckoned with all it was to do.
+/// Simulated time of a run; the whole time for a run that never moved.
 double simulated_s(const BenchmarkPoint& point, const BenchmarkResult& result) {
   return point.end_time_s > 0.0 ? point.end_time_s : result.simulated_s;
 }

@@ -50,7 +50,7 @@ std::string reference_words(const BenchmarkResult& result) {
       r.first.words, r.second.words, significant(r.agreement, 2), peak, significant(r.floor, 2));
 }
 
-/// What a cell says of the cheapest point within an error: "36.7 us/s (400 us)".
+/// Cell of the cheapest point within an error: "36.7 us/s (400 us)".
 std::string cheapest_words(const BenchmarkResult& result, const BenchmarkPoint& point) {
   const std::string cost =
       point.times ? fmt::format("{}/s", seconds_words(point.times->median_s / result.simulated_s))
@@ -100,7 +100,7 @@ const BenchmarkPoint* with_step(const BenchmarkResult& result, const std::string
   return nullptr;
 }
 
-/// What a method does at one servo rate.
+/// Adds the result of a method at one servo rate.
 void add_servo_cells(std::vector<Cell>& row, const BenchmarkPoint* point, double period_s) {
   if (point == nullptr) {
     row.insert(row.end(), {{"-"}, {"-"}});
@@ -272,7 +272,7 @@ void add_model_tables(Document& document, const BenchmarkResult& result, bool ti
       }));
 }
 
-/// How the figures of all problems read, once: their captions, without those of what is missing.
+/// Adds the captions of the figures of all problems once, without missing figures.
 void add_captions(Document& document, const std::vector<Figure>& figures) {
   std::vector<Cell> items;
   for (const bool counts : {false, true}) {

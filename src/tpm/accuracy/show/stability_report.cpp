@@ -69,7 +69,7 @@ const ResultTable<StabilityLimit>& limits_table() {
   return table;
 }
 
-/// What a rule did, of a cell of either kind.
+/// Outcome of a rule in a cell of either kind.
 template <class Row>
 std::vector<ResultColumn<Row>> verdict_columns() {
   return {{"rule", [](const Row& c) { return step_rule_name(c.rule); }},
@@ -112,7 +112,7 @@ Table servo_table(const StabilityStudy& study, const std::string& problem) {
   return table;
 }
 
-/// What is done and what is right, once for all cases that share both.
+/// Motion and expected outcome, once for all cases that share both.
 Table expectations_table(const StabilityStudy& study) {
   using Shared = std::pair<std::string, std::string>;
   const auto shared = [](const LimitingCase& c) { return Shared{c.setup, c.expected}; };

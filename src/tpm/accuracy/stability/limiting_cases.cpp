@@ -43,8 +43,8 @@ StabilityClass all_hold(StepRule) {
   return StabilityClass::holds;
 }
 
-/// What theory says of a viscous state that starts without delay: explicit rules beyond their limit
-/// diverge, and the rules that do not damp what is fast let it ring.
+/// Theory of a viscous state that starts without delay: explicit rules beyond their limit diverge,
+/// and rules without damping of fast modes let it ring.
 Expect of_theory(const LinearElement& linear, double step_s, double steps) {
   return [=](StepRule rule) {
     const auto limit = stable_step_s(rule, linear);
@@ -224,7 +224,7 @@ double star_force_N(const BondElement& p, double rate, double time_s) {
   return unit * p.tension().value(depth) - (depth < kLength_m ? pull : -pull);
 }
 
-/// What the straight path of a star answers in its last steps.
+/// Sets the last steps of a star's straight path as reference.
 void set_star_reference(const BondElement& p, double rate, double end_s, CheckedProblem& checked) {
   checked.times_s = last_steps(end_s, kCaseStep_s, kComparedSteps);
   checked.reference.resize(kComparedSteps);

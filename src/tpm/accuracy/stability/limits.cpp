@@ -189,7 +189,7 @@ std::vector<double> ticks(double rate_Hz) {
   return times;
 }
 
-/// What a servo knows of a protocol: its values at the ticks, straight in between. Corners between
+/// A protocol as a servo samples it: its values at the ticks, linear in between. Corners between
 /// two ticks are lost, as they are in the loop.
 Protocol as_sampled(const Protocol& protocol, const std::vector<double>& ticks_s) {
   std::vector<Knot> knots{{protocol.start_s(), value_at(protocol, protocol.start_s())}};

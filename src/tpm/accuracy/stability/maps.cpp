@@ -12,7 +12,7 @@
 namespace tpm::accuracy {
 namespace {
 
-/// What is varied, and how a problem follows from it.
+/// Varied quantities, and the problem at given values of them.
 struct MapPlan {
   std::string id, quantity, unit, problem;
   std::vector<double> x, step_s;

@@ -24,7 +24,7 @@ Matrix rates(const LinearElement& e) {
   return a;
 }
 
-/// What a step multiplies a state with. Only rules with a limit.
+/// Matrix that multiplies a state in a step. Only rules with a limit.
 Matrix amplification(StepRule rule, const LinearElement& e, double h) {
   const Matrix a = h * rates(e);
   const Matrix one = Matrix::Identity(a.rows(), a.cols());

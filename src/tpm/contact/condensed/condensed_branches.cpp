@@ -12,7 +12,7 @@ namespace {
 
 using Eigen::Index;
 
-/// What a mode of rate lambda does within a step. With D = diag(tau_j) its branches follow
+/// Motion of a mode of rate lambda within a step. With D = diag(tau_j) its branches follow
 ///
 ///     d xi/dt = -B xi,   B = D^-1 (1 + (lambda - 1) 1 gamma')
 ///
@@ -158,8 +158,8 @@ void CondensedBranches::step(CondensedState& state, const Eigen::Vector3d& to) n
   if (state.kept) {
     pending_.setZero();
   } else {
-    // What the change of the rates within the step would have added is added to the next; the
-    // branches have it in common.
+    // The contribution of the rates' change within the step is added to the next step; the branches
+    // have it in common.
     const CondensedVector change =
         modes_.left * after.velocity - speed + modes_.rate.cwiseProduct(mean);
     pending_ = later_.array().colwise() * change.array();

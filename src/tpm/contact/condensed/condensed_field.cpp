@@ -73,7 +73,7 @@ CondensedField::CondensedField(const CondensedFrame& frame, const Eigen::Matrix3
   gram.diagonal().array() += 1e-12 * gram.diagonal().maxCoeff();
   const Eigen::LLT<Eigen::MatrixXd> factor(gram);
 
-  // What q does, likewise: one fit over the places of w for each of its directions.
+  // The same for q: one fit over the places of w for each of its directions.
   const auto places = static_cast<Eigen::Index>(metrics.size());
   Eigen::MatrixXd of_w(places, kOfW);
   Eigen::MatrixXd answers(places, 3 * rest.size());

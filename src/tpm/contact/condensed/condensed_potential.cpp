@@ -87,7 +87,7 @@ CondensedPotential::CondensedPotential(const CondensedFrame& frame,
   }
   const Eigen::VectorXd found = equations.solve();
   coefficients_.assign(found.begin(), found.end());
-  // What the fit leaves at rest is taken out of the constant and the linear terms.
+  // The constant and the linear terms take up the residual of the fit at rest.
   const Gradient rest = gradient(Eigen::Vector3d::Zero(), Eigen::Vector3d::Zero());
   for (std::size_t m = 0; m < monomials.size(); ++m) {
     const CondensedExponents& e = monomials[m];

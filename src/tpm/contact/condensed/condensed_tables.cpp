@@ -116,7 +116,7 @@ void step_condensed(const CondensedTables& tables, const CondensedRates& rates,
   if (state.kept) {
     state.pending.setZero();
   } else {
-    // What the change of the rates within the step would have added is added to the next.
+    // The contribution of the rates' change within the step is added to the next step.
     state.pending =
         rates.second * (after.velocity - before.velocity + rates.rate * (next - state.viscous));
     state.viscous = next;

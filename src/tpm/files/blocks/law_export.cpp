@@ -32,7 +32,7 @@ std::string digits(double value) {
   return significant(value, kDigits);
 }
 
-/// What is exported and the sentences that go with it.
+/// The exported law and its sentences.
 struct Exported {
   std::string name;
   PronyTable table;
@@ -66,7 +66,7 @@ void require_terms(const PronyTable& table, ExportTarget target) {
   }
 }
 
-/// What --relaxation-only drops, and how much of the force that is.
+/// Remarks on the parts that --relaxation-only drops and their share of the force.
 void add_left_out(const LawFile& law, std::vector<Remark>& remarks) {
   const LawSpec& spec = law.spec;
   const LawModel model(spec);

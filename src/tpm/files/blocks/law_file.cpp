@@ -168,9 +168,9 @@ const FileKind& files::law_kind() {
   return kind;
 }
 
-LawFile files::law_from_json(const Json& written, std::string_view where) {
-  LawKeys keys =
-      law_block().made(checked(written, law_kind(), where), DocumentPlace{std::string(where)});
+LawFile files::law_from_json(const Json& written, const DocumentPlace& place) {
+  const std::string& where = place.where;
+  LawKeys keys = law_block().made(checked(written, law_kind(), place), place);
   LawFile law;
   law.spec = spec_of(keys, where);
   law.values = values_of(keys.parameters, law.spec, where);
@@ -184,8 +184,9 @@ LawFile files::law_from_json(const Json& written, std::string_view where) {
   law.fitted_to = is_answered_by_stress(law.spec.drive) ? keys.fitted_to : keys.fitted_to_m;
   law.adequacy = std::move(keys.adequacy);
   if (!keys.fit.is_null()) {
-    law.uncertainty =
-        uncertainty_from_json(keys.fit, law.spec, law.values, fmt::format("{}: fit", where));
+    DocumentPlace fit = place;
+    fit.where += ": fit";
+    law.uncertainty = uncertainty_from_json(keys.fit, law.spec, law.values, fit);
   }
   return law;
 }

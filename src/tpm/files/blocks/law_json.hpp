@@ -19,7 +19,7 @@ namespace tpm::files {
 
 /// Throws Error(bad_input) for anything that schemas/law.schema.json or the law does not allow: an
 /// unknown law or key, a missing parameter without a preset, a value out of range.
-[[nodiscard]] LawFile law_from_json(const Json& json, std::string_view where);
+[[nodiscard]] LawFile law_from_json(const Json& json, const DocumentPlace& place);
 /// An infinite spacing, which is its preset, is left out: JSON has no infinity.
 [[nodiscard]] Json to_json(const LawFile& law);
 
@@ -36,6 +36,6 @@ namespace tpm::files {
 /// another size, one that is not symmetric or not positive semidefinite.
 [[nodiscard]] LawUncertainty uncertainty_from_json(const Json& block, const LawSpec& spec,
                                                    std::span<const double> values,
-                                                   std::string_view where);
+                                                   const DocumentPlace& place);
 
 }  // namespace tpm::files

@@ -284,8 +284,9 @@ const FormPtr& files::uncertainty_form() {
 
 LawUncertainty files::uncertainty_from_json(const Json& block, const LawSpec& spec,
                                             std::span<const double> values,
-                                            std::string_view where) {
-  UncertaintyKeys keys = uncertainty_block().made(block, DocumentPlace{std::string(where)});
+                                            const DocumentPlace& place) {
+  const std::string& where = place.where;
+  UncertaintyKeys keys = uncertainty_block().made(block, place);
   const std::vector<LawParameter> parameters = law_parameters(spec);
   LawUncertainty u = std::move(keys.rest);
   for (const std::string& name : keys.parameters) {

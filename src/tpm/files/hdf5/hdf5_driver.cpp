@@ -22,7 +22,7 @@ struct OpenStorage {
   haddr_t end_of_file = 0;
 };
 
-/// What a file access list carries from open_hdf5() to the driver.
+/// Storage that a file access list carries from open_hdf5() to the driver.
 struct StorageChoice {
   Hdf5Storage* storage;
 };
@@ -80,7 +80,7 @@ haddr_t end_of_storage(const H5FD_t* file, H5FD_mem_t /*type*/) {
   return of(file).end_of_file;
 }
 
-/// What could not be written lies over what was read.
+/// Lays bytes that could not be written over those that were read.
 void lay_over(const Hdf5Storage& storage, haddr_t from, std::size_t size, char* bytes) {
   for (const auto& [place, kept] : storage.unwritten) {
     const std::uint64_t first = std::max<std::uint64_t>(place, from);

@@ -237,7 +237,7 @@ std::string csv_text(const ImportedSeries& series, std::string_view provenance) 
   return csv;
 }
 
-/// What every kind of curve has to fulfil, and what it measures.
+/// Checks the conditions of every kind of curve, and measures it.
 void check_and_measure(ImportedSeries& series, const std::string& file) {
   if (holds_spectrum(series)) {
     require_spectrum(series, file);

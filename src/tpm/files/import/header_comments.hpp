@@ -9,7 +9,7 @@ namespace tpm::files {
 /// The fields of a comment; blanks count as one where they separate.
 [[nodiscard]] std::vector<std::string_view> cut_comment(std::string_view text, char separator);
 
-/// What stands behind the mark of a comment: "#", "%", "//", or ";" where that separates nothing.
+/// Text behind the mark of a comment: "#", "%", "//", or ";" where that separates nothing.
 /// None if there is no mark.
 /// @param separator of the fields of the table
 [[nodiscard]] std::optional<std::string_view> behind_comment_mark(std::string_view text,

@@ -362,7 +362,7 @@ bool is_of_a_step(const std::vector<std::string>& words) {
                      [&words](std::string_view step) { return has_word(words, step); });
 }
 
-/// What the words of a title say, whatever else stands among them.
+/// Quantity that the words of a title name, whatever else stands among them.
 std::optional<Recognized> recognize_words(const std::vector<std::string>& words) {
   // "tan delta", "loss tangent", "loss factor".
   const bool tangent = has_word(words, "tan") || has_word(words, "tangent") ||

@@ -331,7 +331,7 @@ class JpkSeries {
   double start_s_ = 0.0;
 };
 
-/// What a JPK file says itself, or what is about other files, is not taken.
+/// Refuses options for other files, and those that a JPK file states itself.
 void require_jpk_options(const ImportOptions& options, const std::string& file) {
   const bool columns = !options.time_column.empty() || !options.sd_column.empty() ||
                        !options.frequency_column.empty() || !options.storage_column.empty() ||

@@ -29,8 +29,7 @@ class ImportInput {
   std::optional<DelimitedTable> table_;
 };
 
-/// A kind of foreign file. The list in import.cpp holds all (docs/architecture.md, "An
-/// importer").
+/// A kind of foreign file. The list in import.cpp holds all (docs/adding.md).
 struct Importer {
   std::string_view name;  ///< as --input-format takes it
   Provenance usual;       ///< of such a file if the options give none

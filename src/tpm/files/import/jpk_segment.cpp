@@ -125,7 +125,7 @@ std::string JpkProperties::place_of(std::string_view key) const {
 
 namespace {
 
-/// How one sample is stored.
+/// Storage of one sample.
 struct StoredNumber {
   std::string_view word;  ///< "encoder.type" of the file, or "type" where there is no encoder
   std::size_t bytes;

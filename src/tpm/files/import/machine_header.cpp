@@ -284,7 +284,7 @@ void take_meaning_of_logarithms(std::vector<MachineColumn>& columns) {
   }
 }
 
-/// What the rows above a block say of its columns.
+/// Describes the columns of a block by the rows above it.
 void describe_columns(const DelimitedTable& table, const SampleBlock& block, MachineHeader& header,
                       const ImportOptions& options) {
   const std::vector<HeaderRow> above = rows_above(table, block);

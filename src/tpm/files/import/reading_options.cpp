@@ -291,7 +291,7 @@ KeyForm key_form(const ReadingKey& key) {
   return optional_key(std::string(key.option.key), std::move(form), std::move(sentence));
 }
 
-/// How a recording that has no description is read, as a file states it.
+/// Options of a recording without a description, as a file states them.
 ImportOptions import_of(const Json& json, const DocumentPlace& place) {
   ImportOptions import;
   for (const auto& [key, value] : json.items()) {

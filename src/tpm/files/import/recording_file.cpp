@@ -60,7 +60,7 @@ RecordingFile read_described(const fs::path& path, const ImportOptions& options)
   return result;
 }
 
-/// Which of several datasets is meant has to be said.
+/// Throws if there are several datasets and none was chosen.
 void require_one(const ImportedFile& imported, const std::string& file) {
   if (imported.series.size() == 1) return;
   constexpr std::size_t kMostOfName = 200, kMostOfAll = 2000;  // names are to be typed

@@ -18,7 +18,7 @@ struct RefusingWord {
 };
 
 constexpr auto kRefusing = std::to_array<RefusingWord>({
-    // What was asked for.
+    // Commanded values.
     {"command", kAsked},
     {"commanded", kAsked},
     {"cmd", kAsked},

@@ -5,8 +5,7 @@
 
 namespace tpm::files {
 
-Json checked(Json document, const FileKind& kind, std::string_view where, Numbers numbers) {
-  const DocumentPlace place{std::string(where)};
+Json checked(Json document, const FileKind& kind, const DocumentPlace& place, Numbers numbers) {
   if (document.is_object() && document.contains(kSchemaKey)) {
     if (!document.at(kSchemaKey).is_string()) {
       throw bad_input(place.key(kSchemaKey).where, "is of the wrong type",
@@ -14,7 +13,7 @@ Json checked(Json document, const FileKind& kind, std::string_view where, Number
     }
     document = without_schema_key(std::move(document));
   }
-  require_not_other_kind(document, kind.name, where);
+  require_not_other_kind(document, kind.name, place.where);
   require_form(document, *kind.form, place, numbers);
   return document;
 }

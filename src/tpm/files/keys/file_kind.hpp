@@ -20,7 +20,7 @@ struct FileKind {
 /// The document without "$schema", which is for editors. Throws
 /// Error(bad_input), at the key, for what has not the form; what is a file of another kind is
 /// called so.
-[[nodiscard]] Json checked(Json document, const FileKind& kind, std::string_view where,
+[[nodiscard]] Json checked(Json document, const FileKind& kind, const DocumentPlace& place,
                            Numbers numbers = Numbers::texts_alone);
 
 /// A document without "$schema": a document within another, where the name would mean another file.

@@ -34,7 +34,7 @@ std::string shown(const Json& value) {
   return value.is_structured() ? std::string(value.type_name()) : printable(value.dump());
 }
 
-/// What a value of a form is in words: "a length above 0 m, such as \"4 mm\"".
+/// Values of a form in words: "a length above 0 m, such as \"4 mm\"".
 std::string expected_words(const Form& form) {
   const auto with_range = [&](std::string_view noun) {
     const std::string range = form.range.words();
@@ -105,7 +105,7 @@ void require_known(const Json& object, const std::vector<KeyForm>& keys,
   }
 }
 
-/// What is missing, in words: its sentence and what stands there.
+/// Missing key in words: its sentence and its values.
 std::string missing_words(const KeyForm& key) {
   const std::string form = expected_words(*key.form);
   return key.sentence.empty() ? form : fmt::format("{}: {}", key.sentence, form);

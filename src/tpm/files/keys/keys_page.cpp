@@ -14,7 +14,7 @@ namespace {
 
 using Type = Form::Type;
 
-/// What stands under a key, in a cell of a table.
+/// Type of a key's value, in a cell of a table.
 std::string type_cell(const Form& form) {
   const auto with_range = [&](std::string noun, std::string_view unit = {}) {
     const std::string range = form.range.words(unit);

@@ -134,7 +134,7 @@ double score_of(const DesignProblem& problem, const Expectation& expected, doubl
   return largest;
 }
 
-/// What is there before any candidate: previous experiments and what is known.
+/// Knowledge before any candidate: previous experiments and known values.
 Knowledge known_before(const DesignProblem& problem) {
   Knowledge before = nothing_known(problem);
   for (std::size_t i = 0; i < problem.known.size(); ++i) {

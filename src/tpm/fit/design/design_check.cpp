@@ -93,7 +93,7 @@ Remark disagreement(const CheckedParameter& p) {
                                                  fixed(p.bias, 2), fixed(p.bias_error, 2))};
 }
 
-/// What the simulated experiments alone would tell.
+/// Knowledge from the simulated experiments alone.
 Expectation predicted(const DesignProblem& problem,
                       const std::vector<PlannedExperiment>& experiments) {
   Knowledge knowledge = nothing_known(problem);

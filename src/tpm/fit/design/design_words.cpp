@@ -56,7 +56,7 @@ std::optional<double> characteristic_time(const DesignProblem& problem, std::siz
   return from_vector(fitted_element(problem.config, starts)).relaxation_time_s();
 }
 
-/// What of a protocol keeps a time from being seen; empty if nothing obvious does.
+/// Reason why a protocol hides a relaxation time; empty if none is obvious.
 std::string hidden_time(double tau_s, const PlannedExperiment& e) {
   const std::string tau = significant(tau_s, 3);
   constexpr double kFew = 2.0;

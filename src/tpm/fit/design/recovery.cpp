@@ -42,7 +42,7 @@ double visible_value(const LawParameter& p, int branches, double order) {
   return 0.2 * std::pow(60.0, static_cast<double>(place) / (branches - 1));
 }
 
-/// What the trials of one law share.
+/// Data shared by the trials of one law.
 struct Trials {
   LawSpec law;
   std::vector<double> true_values;

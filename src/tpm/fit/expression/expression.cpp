@@ -100,7 +100,7 @@ struct Evaluator::Impl {
     return definition == definitions.end() ? nullptr : &definition->second;
   }
 
-  /// What may be named: all of it where the scope is all there is, else where to look.
+  /// Names that may be used: all if the scope has no others, else where they are listed.
   std::string known(const Scope& scope) const {
     if (!symbols.empty() || !definitions.empty()) return "a name from 'symbols' or 'definitions'";
     const std::vector<std::string> all = names(scope);
@@ -116,7 +116,7 @@ struct Evaluator::Impl {
     return all;
   }
 
-  /// What the definitions of one evaluation came to: each is computed once, or a chain of
+  /// Values of the definitions in one evaluation: each is computed once, or a chain of
   /// definitions that name two earlier ones each would cost a power of two.
   struct Known {
     std::map<std::string, double, std::less<>> values;

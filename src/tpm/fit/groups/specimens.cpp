@@ -148,7 +148,7 @@ void require_one_reference(const SpecimenRow& first, const SpecimenRow& row) {
                   fmt::format("those of '{}': {}", first.name, reference_words(a)));
 }
 
-/// What is said of theta, said of the parameter.
+/// Effects on the parameter, from those on theta.
 std::string in_natural_words(const PooledParameter& p) {
   constexpr std::string_view kTheta = " in theta";
   std::string words = p.effects.summary;
@@ -346,7 +346,7 @@ Json to_json(const SpecimenStudy& study) {
 
 namespace {
 
-/// How many recordings the law does not describe, and of how many that could not be judged.
+/// Number of recordings that the law does not describe, and of those without a verdict.
 std::string adequacy_words(const SpecimenStudy& study) {
   std::string text;
   const auto fitted = std::ranges::count_if(study.rows, [](const auto& r) { return !!r.fit; });

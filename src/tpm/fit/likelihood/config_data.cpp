@@ -51,7 +51,7 @@ double stiffness_per_modulus(const Placed<double>& stated, const FitConfig& conf
                   "it only with oscillation and a law of contact force over indentation depth");
 }
 
-/// Whether the response was imposed, as in creep.
+/// True if the response was imposed, as in creep.
 bool response_is_imposed(const Placed<bool>& stated, const FitConfig& config,
                          FitProtocol protocol) {
   const bool answers = config.law && (config.law->drive == Quantity::strain ||

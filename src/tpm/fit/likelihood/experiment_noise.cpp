@@ -1,5 +1,5 @@
 // Declared in tpm/fit/likelihood/experiment_residuals.hpp.
-// What ExperimentResiduals knows of its noise.
+// The noise of ExperimentResiduals.
 #include <fmt/format.h>
 
 #include <algorithm>

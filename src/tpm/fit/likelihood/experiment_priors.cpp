@@ -1,5 +1,5 @@
 // Declared in tpm/fit/likelihood/experiment_residuals.hpp.
-// What ExperimentResiduals knows beside readings: priors, drifts of the zero, and rises.
+// Terms of ExperimentResiduals beside readings: priors, drifts of the zero, and rises.
 #include <stdexcept>
 
 #include "tpm/fit/likelihood/experiment_residuals.hpp"

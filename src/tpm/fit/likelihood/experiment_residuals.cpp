@@ -39,7 +39,7 @@ void ExperimentResiduals::find_linear() {
                                     d.noise.kind != NoiseKind::relative_to_model &&
                                     d.noise.shape == ErrorShape::normal && !d.estimates_sigma();
                            });
-  // What answers a load with a depth is linear in a compliance, not in a stiffness.
+  // A depth in response to a load is linear in a compliance, not in a stiffness.
   const bool by_load = std::ranges::any_of(experiments_, [](const Experiment& e) {
     const auto* course = std::get_if<TimeCourse>(&e.imposed);
     return course != nullptr && course->protocol.drive() == Drive::force;

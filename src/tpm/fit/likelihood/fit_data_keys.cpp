@@ -85,7 +85,7 @@ ValueType<StatedSigma> absolute_sigma() {
       });
 }
 
-/// Which of both a kind of noise uses.
+/// Fault if a kind of noise states the wrong one of both keys.
 std::optional<Fault> sigma_fault(const StatedNoise& noise) {
   const NoiseKind kind = noise.kind();
   const auto fault = [&](const char* name, bool stands, bool needed) -> std::optional<Fault> {

@@ -172,7 +172,7 @@ void descend(const ResidualFunction& function, std::span<const FitParameter> par
   minimum.message = summary.message;
 }
 
-/// Which of the candidates a descent would push through a bound, or none if it cannot be told.
+/// Candidates that a descent would push through a bound; none if that is undetermined.
 FixedMask pressed_against_bound(const ResidualFunction& function,
                                 std::span<const FitParameter> parameters,
                                 const std::vector<double>& natural, const FixedMask& fixed) {

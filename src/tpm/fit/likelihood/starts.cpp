@@ -161,7 +161,7 @@ std::vector<std::vector<double>> projected_starts(const ResidualFunction& functi
 
 namespace {
 
-/// Which estimated parameters the residuals are linear in.
+/// Estimated parameters in which the residuals are linear.
 std::vector<bool> linear_parameters(const ExperimentResiduals& function) {
   std::vector<bool> linear(function.config().parameters.size());
   for (std::size_t i = 0; i < linear.size(); ++i) linear[i] = function.linear_in(i);

@@ -1,6 +1,6 @@
 #pragma once
-// What the configuration of a fit states (its keys: fit_keys.cpp). Quantities are in the
-// dimensions of the model and the data, which config_parts.hpp knows.
+// The configuration of a fit as stated (its keys: fit_keys.cpp). Quantities are in the dimensions
+// of the model and the data, which config_parts.hpp knows.
 #include <cstdint>
 #include <optional>
 #include <string>

@@ -1,5 +1,5 @@
 // Declared in tpm/fit/online/identification.hpp.
-// What an identification says: JSON and terminal.
+// Output of an identification: JSON and terminal.
 #include <fmt/format.h>
 
 #include <algorithm>

@@ -39,7 +39,7 @@ class ReplayedLoop {
     try_hand_over(r.time_s[sample]);
   }
 
-  /// What is known now may be better than what is in the loop.
+  /// Takes a sample's law and parameters if they are known better than those in the loop.
   void learn(const IdentifiedSample& known) {
     const double width = known.estimate.widest_relative_half_width();
     if (!(width <= options_.first_width)) return;

@@ -125,7 +125,7 @@ std::vector<BudgetStage> loop_stages(const LawFile& law, const Protocol& motion,
   return stages;
 }
 
-/// What the instrument of a recording leaves unknown of its force F at depth u and time t:
+/// Uncertainty of a recording's force F at depth u and time t due to its instrument:
 /// u^2 = (gain F)^2 + zero^2 + (dF/du)^2 (a^2 + (b u)^2) + (dF/dt)^2 c^2.
 void add_instrument_part(ErrorBudget& budget, const LawFile& plain, const Protocol& motion,
                          const Instrument& instrument, double level) {
@@ -157,7 +157,7 @@ void add_instrument_part(ErrorBudget& budget, const LawFile& plain, const Protoc
   budget.instrument = BudgetInstrumentPart{instrument.id, level, k * largest / budget.peak_N};
 }
 
-/// How a prediction is asked for the random part.
+/// Options of a prediction for the random part.
 PredictionOptions random_part_options(const BudgetOptions& options) {
   PredictionOptions prediction;
   prediction.samples = options.samples;

@@ -1,5 +1,5 @@
 // Declared in tpm/fit/predict/error_budget.hpp.
-// What a budget says: JSON, terminal, CSV.
+// Output of a budget: JSON, terminal, CSV.
 #include <fmt/format.h>
 
 #include "tpm/base/text.hpp"

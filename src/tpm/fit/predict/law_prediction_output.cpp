@@ -1,5 +1,5 @@
 // Declared in tpm/fit/predict/law_prediction.hpp.
-// What a prediction says: JSON, terminal, CSV.
+// Output of a prediction: JSON, terminal, CSV.
 #include <fmt/format.h>
 
 #include <algorithm>

@@ -213,8 +213,8 @@ Eigen::MatrixXd law_slopes(const LawFile& law, const std::vector<MaterialMotion>
   return slopes;
 }
 
-/// How the bonds follow the law's parameters, and the intervals that follow from its covariance
-/// where the readings give none.
+/// Derivatives of the bonds by the law's parameters, and the intervals that follow from its
+/// covariance where the readings give none.
 void carry_uncertainty(OrganMaterial& m, const OrganLessLaw& function, const LawFile& law,
                        const std::vector<MaterialMotion>& motions) {
   const auto natural = mapped<double>(m.parameters, &OrganMaterialParameter::value);
@@ -386,7 +386,7 @@ void go_on_to_readings(OrganMaterial& m, const OrganLessLaw& function, const Org
   m.readings = std::move(readings);
 }
 
-/// How the organ answers with the material that was found.
+/// Response of the organ with the material that was found.
 void answer(OrganMaterial& m, const OrganLessLaw& function,
             const std::vector<MaterialMotion>& motions) {
   std::vector<double> natural;

@@ -1,5 +1,5 @@
 // Declared in tpm/fit/predict/organ_material_parts.hpp.
-// What a law put on an organ writes and says: scene, session, JSON, terminal, CSV.
+// Output of a law put on an organ: scene, session, JSON, terminal, CSV.
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -102,7 +102,7 @@ double ramp_rate(const MaterialCourse& c) {
   return deepest / std::max(c.time_s.back() - c.time_s.front(), 1e-3);
 }
 
-/// Which samples lie before the deepest depth is reached.
+/// True for samples before the deepest depth is reached.
 std::vector<bool> on_the_way_in(const MaterialCourse& c) {
   constexpr double kHeld = 0.02;  // of the deepest depth from there on
   const double deepest = deepest_of(c);
@@ -140,7 +140,7 @@ Json course_json(const OrganMaterial& m, const MaterialCourse& c) {
   return entry;
 }
 
-/// What the fit to the readings says: intervals and profiles of all its parameters.
+/// Result of the fit to the readings: intervals and profiles of all its parameters.
 Json readings_json(const OrganMaterial& m) {
   const ReadingsFit& r = *m.readings;
   Json parameters = Json::object();

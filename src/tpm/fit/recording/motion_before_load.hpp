@@ -6,7 +6,7 @@
 
 namespace tpm::fit {
 
-/// How many of the samples before the load the drive stands still in, from the first on; all of
+/// Number of samples before the load, from the first on, in which the drive stands still; all of
 /// them if it does so in fewer than 10.
 [[nodiscard]] std::size_t still_samples(const Recording& recording, std::size_t at_rest);
 

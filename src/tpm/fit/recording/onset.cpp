@@ -158,7 +158,8 @@ struct PartRange {
   Measured zero;
 };
 
-/// How far contact may move on one side before the squares have risen, or to the end of the range.
+/// Distance by which contact may move on one side until the squares have risen, or to the end of
+/// the range.
 double way_to(const FirstLoading& part, const FirstLoading::Best& best, double end, double m,
               double zero, double squares) {
   constexpr int kHalvings = 40;

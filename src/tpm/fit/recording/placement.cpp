@@ -36,7 +36,7 @@ std::size_t peak_drive_index(const PreparedRecording& r) {
   return static_cast<std::size_t>(std::ranges::max_element(drive) - drive.begin());
 }
 
-/// How far a drive at rest may be off, and how far in the air it has to be while it moves.
+/// Largest error of a drive at rest, and distance that it needs in the air while it moves.
 struct Clear {
   double tolerance = 0.0, far = 0.0;
 };
@@ -213,7 +213,7 @@ std::optional<HoldSamples> hold_samples(const PreparedRecording& r) {
   return HoldSamples{std::move(kept_time), reading, curve, step_s, variance};
 }
 
-/// What rests say, and the standard deviations of zero and drift at the upper end of the 95 %
+/// Estimates from rests, and the standard deviations of zero and drift at the upper end of the 95 %
 /// interval of the noise.
 struct RestEstimate {
   RestReadings readings;

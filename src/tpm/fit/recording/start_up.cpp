@@ -68,7 +68,8 @@ std::size_t end_of_rise(const PreparedRecording& r, const Phase& hold) {
 
 void leave_out_start_up(PreparedRecording& r) {
   constexpr double kTimesOfStep = 2.0;
-  // What is seen to end is a tail above the noise: it takes about as long again, twice, to vanish.
+  // The visible end is that of a tail above the noise, which takes about twice as long again to
+  // vanish.
   constexpr std::size_t kTimesOfSeen = 3;
   const std::optional<Phase> hold = hold_after_step(r);
   if (!hold) return;

@@ -13,7 +13,7 @@
 namespace tpm::fit {
 namespace {
 
-/// What the drive does between two samples: whether it rises (1), falls (-1) or hardly moves.
+/// Motion of the drive between two samples: it rises (1), falls (-1) or hardly moves.
 class Motions {
  public:
   explicit Motions(const PreparedRecording& r)

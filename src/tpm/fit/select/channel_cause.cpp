@@ -50,7 +50,7 @@ std::vector<double> low_passed(std::span<const double> time_s, std::span<const d
   return out;
 }
 
-/// How well a law describes the recording with a fault made good.
+/// Fit of a law to the recording with a fault corrected.
 struct FaultTrial {
   ChannelFault fault = ChannelFault::response_delayed;
   double time_s = 0.0;
@@ -88,8 +88,8 @@ FaultTrial trial_of(const LawSpec& law, const PreparedRecording& r, ChannelFault
   const auto work = [&] {
     const std::array one{prepare_recording(r.name, with_same_fault(r.recording, fault, time_s))};
     const PreparedRecording& mended = one.front();
-    // What a shift leaves out of the fit is not described by it, and a load that begins before the
-    // motion is no noise.
+    // The law does not describe samples that a shift leaves out of the fit, and a load that begins
+    // before the motion is no noise.
     if (mended.load_imposed || travel(mended) < kWhole * travel(r)) return;
     const Recording& read = mended.recording;
     const std::size_t at_rest = samples_at_rest(mended.phases);
@@ -189,7 +189,7 @@ const LawSpec& general_law(const std::vector<LawSpec>& laws) {
   return *general;
 }
 
-/// How long the drive takes to its largest value, once the load has begun.
+/// Time from the begin of the load to the largest drive.
 double rise_s(const PreparedRecording& r) {
   const std::vector<double>& drive = r.recording.drive;
   const auto peak = static_cast<std::size_t>(std::ranges::max_element(drive) - drive.begin());
@@ -286,7 +286,7 @@ void name_channel_cause(Selection& s, std::span<const PreparedRecording> recordi
   const std::vector<LawSpec> laws = laws_to_try(s);
   if (laws.empty()) return;
   const double step_s = median_step(r.recording.time_s);
-  // What is as slow as the ramp would leave only the hold to be compared, and looks like tissue.
+  // A delay as slow as the ramp would leave only the hold to be compared, and looks like tissue.
   const double longest_s =
       std::min(std::max(kOfRamp * rise_s(r), kFewSteps * step_s), kLongest * (r.to_s - r.from_s));
   const auto likelier = [&](ChannelFault one, ChannelFault other) {

@@ -75,7 +75,7 @@ Eigen::MatrixXd drifting_covariance(const Covariance& own, const Covariance& dri
   return drifting.theta_covariance()(places, places);
 }
 
-/// What pools and law files know of a fit is its covariance. It becomes that of the fit with a
+/// Pools and law files take the covariance of a fit. It becomes that of the fit with a
 /// drift and d d', d the difference of both answers, and each standard error at least so large that
 /// the interval that it stands for holds both.
 void hold_both_in_covariance(FitResult& fit, const FitResult& drifting, double spread) {

@@ -127,7 +127,7 @@ Refusal refusal_of(const Candidate& candidate, const ProtocolSpans& spans) {
   return first;
 }
 
-/// What a law is that stands where it becomes a simpler one.
+/// Simpler law that a law equals at these parameters.
 std::string special_case(const FitResult& fit) {
   std::string words;
   for (const ParameterResult& p : fit.parameters) {

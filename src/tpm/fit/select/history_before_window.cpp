@@ -17,7 +17,7 @@ namespace {
 
 constexpr const char* kHistoryBeforeWindow = "history_before_window";
 
-/// What a law forgets last.
+/// Longest memory of a law.
 struct LongestMemory {
   std::string name;
   double time_s = 0.0;  ///< infinite for a spring-pot; 0 for a law without memory
@@ -68,7 +68,7 @@ std::optional<double> last_load_s(const RecordingFit& r, const Recording& whole,
   return last;
 }
 
-/// What a reader must know of a recording; empty if its history is complete, or forgotten.
+/// Remark on a recording's missing history; empty if it is complete, or relaxed.
 std::string history_words(const FitResult& fit, const RecordingFit& r) {
   constexpr double kForgotten = 5.0;  // relaxation times: exp(-5) is 0.7 %
   const DataChoice& choice = fit.config.data[r.choice];

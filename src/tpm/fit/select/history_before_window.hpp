@@ -3,7 +3,7 @@
 
 namespace tpm::fit {
 
-/// Whether a law is fitted without loads that the material still remembered. Rows that --from-time
+/// Detects a fit without earlier loads that had not relaxed yet. Rows that --from-time
 /// or --step-time leave out when a file is read are no part of the history that drives the law: it
 /// then rests at the drive of the first row that is kept. The file is read once more without them.
 /// Where a load among them (2 % of the largest fitted drive from contact, with a response beyond

@@ -187,7 +187,7 @@ std::vector<std::size_t> thinned(const std::vector<Phase>& phases, std::size_t e
   return kept;
 }
 
-/// What a search for starts needs of a recording of creep, as its table has it: until the load
+/// Part of a recording of creep, as in its table, for the search for starts: until the load
 /// falls, and few samples. A noisy strain that is imposed while it recovers loses contact and finds
 /// it again by the hundred, and each time takes steps instead of a closed form: with the recovery
 /// of 600 samples this took ten times as long as all other fits of the family.

@@ -26,7 +26,7 @@
 namespace tpm::fit {
 namespace {
 
-/// What the readings tell about the sizes of a law's parameters.
+/// Sizes of a law's parameters, estimated from the readings.
 struct FunctionSizes {
   double stiffness = 0.0;  ///< largest, Pa or N/m
   double shortest_s = std::numeric_limits<double>::infinity();
@@ -169,7 +169,7 @@ void add_floor(FitConfig& config, std::optional<double> floor) {
   noise.absolute = kShare * *floor;
 }
 
-/// What the first fits tell of the instrument.
+/// Limits of the instrument, estimated from the first fits.
 struct InstrumentLimits {
   std::optional<double> scatter = std::nullopt;           ///< see scatter_floor()
   double to_s = std::numeric_limits<double>::infinity();  ///< behind it readings stand at a floor
@@ -195,7 +195,7 @@ Candidate fit_function(const LawSpec& law, const MaterialFunction& function, Set
   return candidate;
 }
 
-/// What was assumed of small readings, and relaxation times that lie outside what was measured.
+/// Assumptions on small readings, and relaxation times outside the measured range.
 std::vector<Remark> range_remarks(const FitResult& fit, const FunctionSizes& sizes) {
   std::vector<Remark> remarks;
   if (fit.config.data.front().noise.kind == NoiseKind::combined && sizes.beyond_instruments()) {

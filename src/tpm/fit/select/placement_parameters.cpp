@@ -168,7 +168,7 @@ Unit drift_unit_of(const PreparedRecording& r) {
 }
 
 /// True if the rests of a recording tell its drift: those of an indentation under an imposed depth.
-/// What is measured of a strip or a creeping specimen at rest may be the tissue.
+/// The readings of a strip or a creeping specimen at rest may be the tissue's.
 bool rests_unloaded(const LawSpec& law, const PreparedRecording& r) {
   return is_indentation(law) && !r.load_imposed;
 }
@@ -210,8 +210,8 @@ void hold_zero_of_load(FitConfig& config, const LawModel& model, const PreparedR
       {{model.index("offset"), std::move(scope)}});
 }
 
-/// What the rest before the load tells of the parameter that was added last, where the fit begins
-/// behind it.
+/// Takes the level of the rest before the load for the parameter that was added last, where the fit
+/// begins behind it.
 void take_level_before_load(FitConfig& config, const PreparedRecording& r) {
   const auto before = level_before_load(r);
   if (!before) return;

@@ -55,7 +55,7 @@ bool swings_back(const PreparedRecording& r, const Phase& phase) {
 constexpr std::size_t kBaseline = 10;
 constexpr std::size_t kFewestBeforeContact = 3;
 
-/// What the recordings tell about the sizes of a law's parameters.
+/// Sizes of a law's parameters, estimated from the recordings.
 struct Sizes {
   double drive = 0.0;     ///< largest drive above contact
   double response = 0.0;  ///< largest response above its floor
@@ -178,7 +178,7 @@ AutomaticBounds law_parameter_bounds(const LawParameter& p, const Sizes& sizes, 
     fit.lower = 0.5 * sizes.shortest_s;
     fit.upper = 10.0 * sizes.longest_s;
     fit.start = std::clamp(0.1 * sizes.longest_s, fit.lower, fit.upper);
-    // What relaxes between two samples is not seen, however far the bound is moved.
+    // Relaxation between two samples is invisible, however far the bound is moved.
     widest = {fit.lower, kFurther * fit.upper};
   } else if (p.name == "exponent") {
     fit = linear(1.0, 1.5, 6.0);

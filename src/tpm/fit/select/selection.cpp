@@ -209,8 +209,8 @@ void hold_out(Candidate& c, std::span<const PreparedRecording> recordings,
   c.held_out.push_back({"failed: " + failure, kInfinity, kInfinity, kInfinity, 0.0});
 }
 
-/// How near each law comes to recording i from the others. No verdict: that takes the uncertainty
-/// of the prediction, which tpm validate counts.
+/// Error of each law at recording i when fitted to the others. No verdict: that takes the
+/// uncertainty of the prediction, which tpm validate counts.
 void describe_prediction(Selection& s, std::size_t i) {
   std::vector<std::string> errors;
   for (const Candidate& c : s.candidates) {

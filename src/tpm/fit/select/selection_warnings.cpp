@@ -1,5 +1,5 @@
 // Declared in tpm/fit/select/selection.hpp.
-// What a selection says about the samples outside the window, and about the protocol.
+// Warnings of a selection on the samples outside the window, and on the protocol.
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -68,7 +68,7 @@ Outside outside_of(const RecordingFit& r) {
   return o;
 }
 
-/// Which part was fitted, why it ends there, and how another one is.
+/// The fitted part, the reason for its end, and how to fit another one.
 std::string window_words(const std::string& name, const RecordingFit& r, const Outside& o) {
   const auto first = std::ranges::find(r.fitted, true);
   const auto begin = static_cast<std::size_t>(first - r.fitted.begin());

@@ -28,8 +28,8 @@ constexpr auto kCategories = std::to_array<std::string_view>(
     {"code verification", "calculation verification", "calibration", "bench-test validation",
      "in vivo validation", "population-based validation", "emergent behaviour", "plausibility"});
 
-std::string stated_words(const Json& words, const char* key) {
-  const std::string text = words.at(key).get<std::string>();
+std::string stated(const Json& summary, const char* key) {
+  const std::string text = summary.at(key).get<std::string>();
   return text.empty() ? kNotStated : text;
 }
 
@@ -46,13 +46,13 @@ class EvidencePage {
     d.title = fmt::format("Credibility of {}", validation_.at("law_file").get<std::string>());
     d.subtitle = "Headings after ASME V&V 40 and the FDA's guidance of November 2023";
     if (!changes.empty()) add_changes(d, changes);
-    const Json& words = record_.at("words");
+    const Json& summary = record_.at("summary");
     d.heading(2, "Question, context and risk");
     d.table({"in the words of the user",
              {{"", false}, {"", false}},
-             {{{"question of interest"}, {stated_words(words, "question")}},
-              {{"context of use"}, {stated_words(words, "context")}},
-              {{"model risk"}, {stated_words(words, "risk")}}}});
+             {{{"question of interest"}, {stated(summary, "question")}},
+              {{"context of use"}, {stated(summary, "context")}},
+              {{"model risk"}, {stated(summary, "risk")}}}});
     d.heading(2, "Evidence by category");
     add_categories(d);
     d.heading(2, "Calibration");
@@ -104,7 +104,7 @@ class EvidencePage {
     d.table(std::move(table));
   }
 
-  /// What was found by the validation itself, of the categories that it fills.
+  /// Categories filled by the validation itself.
   [[nodiscard]] std::map<std::string, Cell> found() const {
     std::string calibration = "files that the law does not name";
     const Json& files = validation_.at("calibration");
@@ -352,12 +352,13 @@ Json law_record(const LawFile& law) {
 }  // namespace
 
 Json credibility_record(const ValidationRequest& request, const Validation& validation,
-                        const CredibilityWords& words, Json invocation,
+                        const CredibilitySummary& summary, Json invocation,
                         const std::vector<CredibilityEvidence>& evidence,
                         const std::vector<std::string>& other_files) {
   Json record{
       {"tpm", version()},
-      {"words", {{"question", words.question}, {"context", words.context}, {"risk", words.risk}}},
+      {"summary",
+       {{"question", summary.question}, {"context", summary.context}, {"risk", summary.risk}}},
       {"invocation", std::move(invocation)}};
   Json files = Json::object();
   files[validation.law_file] = request.law_sha256;
@@ -420,7 +421,8 @@ Json read_credibility_record(const std::filesystem::path& page) {
   }
   const auto from = begin + kRecordOpens.size();
   Json record = parse_json(std::string_view(text).substr(from, end - from), page.string());
-  for (const char* key : {"tpm", "words", "invocation", "files", "evidence", "law", "validation"}) {
+  for (const char* key :
+       {"tpm", "summary", "invocation", "files", "evidence", "law", "validation"}) {
     if (!record.is_object() || !record.contains(key)) {
       throw bad_input(page.string(), fmt::format("its record lacks '{}'", key),
                       "a page that tpm validate --credibility has written");

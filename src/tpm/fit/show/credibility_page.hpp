@@ -9,7 +9,7 @@
 namespace tpm::fit {
 
 /// Statements about a model that only the user can make (ASME V&V 40).
-struct CredibilityWords {
+struct CredibilitySummary {
   std::string question, context, risk;  ///< empty: not stated, and shown so
 };
 
@@ -23,13 +23,13 @@ struct CredibilityEvidence {
 /// them; the file is read by `credibility_record`, for its SHA-256.
 [[nodiscard]] CredibilityEvidence parse_evidence(std::string_view text, std::string_view where);
 
-/// Everything that a credibility page shows, as JSON: the words, the invocation that recomputes it,
-/// the files with their SHA-256, the law with its parameters, and the validation.
+/// Everything that a credibility page shows, as JSON: the summary, the invocation that recomputes
+/// it, the files with their SHA-256, the law with its parameters, and the validation.
 /// @param invocation as the caller needs it to ask again
 /// @param other_files read beside law and recordings: an instrument, a session
 [[nodiscard]] Json credibility_record(const ValidationRequest& request,
-                                      const Validation& validation, const CredibilityWords& words,
-                                      Json invocation,
+                                      const Validation& validation,
+                                      const CredibilitySummary& summary, Json invocation,
                                       const std::vector<CredibilityEvidence>& evidence = {},
                                       const std::vector<std::string>& other_files = {});
 

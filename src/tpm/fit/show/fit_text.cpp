@@ -102,7 +102,7 @@ std::string recording_line(const FitResult& result, const RecordingFit& r) {
   return text + "\n";
 }
 
-/// What chi-square was counted with, if the size of the noise was estimated.
+/// Noise that chi-square was computed with, if its size was estimated.
 std::string noise_line(const FitResult& result) {
   const bool known = std::all_of(result.config.data.begin(), result.config.data.end(),
                                  [](const DataChoice& d) { return d.noise.scale_known; });

@@ -51,7 +51,7 @@ Json axis_of(const Json& axis) {
   return json;
 }
 
-/// What stands below the plots of a figure.
+/// Text below the plots of a figure.
 std::string caption_of(const Json& figure) {
   std::string caption = figure.value("caption", "");
   const std::string note = figure.value("note", "");
@@ -192,8 +192,7 @@ std::string interval_name_of(const Json& fit, const DocumentPlace& place) {
   return significant(100.0 * value, 3) + " % interval";
 }
 
-/// How far the deviance rises above its least value along a parameter, with the interval that is
-/// read from it.
+/// Profile of the deviance along a parameter, with the interval that is read from it.
 void add_profile(ViewPage& page, const Json& parameter, const Unit& unit,
                  const std::string& interval_name) {
   std::vector<double> x, y, ends;
@@ -260,7 +259,7 @@ void add_answer(ViewPage& page, const Json& fit, const DocumentPlace& place) {
   }
 }
 
-/// What the selection of a law concludes, before anything else.
+/// Adds the conclusion of a law's selection first.
 void add_conclusion(ViewPage& page, const Json& answer, const Json& fit) {
   Json& lead = page.description["lead"] = Json::array();
   const auto add = [&lead](const std::string& text, bool doubt) {

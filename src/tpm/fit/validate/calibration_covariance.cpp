@@ -13,7 +13,7 @@
 namespace tpm::fit {
 namespace {
 
-/// What one recording says of the law and of its own placement.
+/// Derivatives of one recording by the law and by its own placement.
 struct FittedSlopes {
   /// Of all samples: what each adds to the scores of law and placement, the derivatives of the
   /// fitted ones and, of a placement that was measured, its weight in what the fit took for it.

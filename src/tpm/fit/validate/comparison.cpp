@@ -36,7 +36,7 @@ RecordingComparison begun(const PreparedRecording& recording, const ComparisonOp
   return begun;
 }
 
-/// What all quantities of a recording are computed from.
+/// Computes all quantities of a recording.
 class Comparer {
  public:
   Comparer(const LawFile& law, const PreparedRecording& recording, const ComparisonOptions& options)
@@ -95,7 +95,7 @@ class Comparer {
     return result_.creep ? KnownPlacement::no_load : options_.known;
   }
 
-  /// How far the numbers of S may be off, and who gives them.
+  /// Refines the numerical uncertainty of S, and notes its source.
   void refine() {
     refinements_ = along_.refinements(result_.placement.contact);
     if (options_.fillings != nullptr) {
@@ -394,7 +394,7 @@ class Comparer {
           covariance(i, j) += (1.0 + a.of_mean * b.of_mean) * a.of_specimen.dot(b.of_specimen);
         }
       }
-      // What only this quantity has: numerical errors, and a zero that was stated.
+      // Contributions to this quantity alone: numerical errors, and a zero that was stated.
       const double own = a.e.u_val * a.e.u_val - covariance(i, i);
       if (own > 0.0) covariance(i, i) += own;
     }

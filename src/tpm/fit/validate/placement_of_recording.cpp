@@ -330,7 +330,7 @@ ValidationPlacement fitted_placement(const LawAlong& law, const Recording& r,
   p.contact_u_sampled = 0.0;
   p.contact_u = scatter.of(r.time_s, p.contact_by_reading);
   p.zero_u = scatter.of(r.time_s, p.zero_by_reading);
-  // What the fit and the held placement share of the noise is in both.
+  // The noise shared by the fit and the held placement is in both.
   const double between_zeros = scatter.of(r.time_s, p.zero_by_reading - held.zero_by_reading);
   if (held.zero_readings > 0 && between_zeros > 0.0) {
     p.zero_moved = std::abs(p.zero - held.zero) / between_zeros;

@@ -20,8 +20,8 @@ namespace {
 constexpr std::size_t kFewestReadings = 10;
 constexpr std::size_t kMostOfScatter = 20'000;  // more tell sigma no better than anyone needs
 
-/// What a curve without noise may be made of, over [0, 1]: exponentials that decay, times a factor
-/// of two apart, or powers.
+/// Basis of a curve without noise over [0, 1]: decaying exponentials, times a factor of two apart,
+/// or powers.
 Eigen::MatrixXd smooth_shapes(std::span<const double> x, bool hold) {
   constexpr Eigen::Index kTimes = 10, kDegree = 4;
   const auto places = Eigen::VectorXd::Map(x.data(), static_cast<Eigen::Index>(x.size())).array();
@@ -45,7 +45,7 @@ bool trembles(std::span<const double> drive, double travel) {
   return *high - *low > kSmall * travel;
 }
 
-/// What a viscoelastic material may answer to a drive that does not stay: the drive itself and its
+/// Basis of a viscoelastic response to a drive that is not constant: the drive itself and its
 /// memories, int exp(-(t - s) / tau) dx(s), with times a factor of four apart.
 Eigen::MatrixXd answers_to(std::span<const double> time_s, std::span<const double> drive) {
   constexpr Eigen::Index kMemories = 6;

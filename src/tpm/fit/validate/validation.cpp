@@ -92,7 +92,7 @@ bool was_fitted(const ValidationRequest& request, const PreparedRecording& recor
   });
 }
 
-/// Which fitted data a recording is a part of; empty: of none that was found.
+/// The fitted data that contain a recording; empty if none were found.
 std::string copy_words(const ValidationRequest& request, const PreparedRecording& recording,
                        const RecordingComparison& compared) {
   constexpr double kMostOfIndependent = 0.5;
@@ -149,7 +149,7 @@ std::string threshold_words(const ValidationRequest& request) {
          "the recordings from where the force is passed; the difference is in E";
 }
 
-/// How the recordings of a calibration differ from the law, each taken for one specimen. Shares of
+/// Differences of a calibration's recordings from the law, each taken for one specimen. Shares of
 /// the law, so it answers in place of an organ.
 /// Quantities whose spread between specimens is estimated as 0: how large a one is not excluded.
 void add_unseen_spread(Validation& v) {

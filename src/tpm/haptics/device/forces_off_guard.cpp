@@ -21,7 +21,7 @@ constexpr std::array kStops{SIGTSTP, SIGTTIN, SIGTTOU};
 constexpr std::array kFailedWrites{SIGPIPE, SIGXFSZ};
 constexpr std::size_t kSignals = 65;
 
-// What a signal handler reads.
+// Read by a signal handler.
 std::array<std::atomic<HapticDevice*>, 32> guarded;
 std::atomic<int> end_signal{0}, last_signal_seen{0};
 std::array<struct sigaction, kSignals> before;

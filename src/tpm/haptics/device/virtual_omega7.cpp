@@ -44,7 +44,7 @@ void VirtualOmega7::enable_forces() {
   (void)plant_.command(Eigen::Vector3d::Zero());
 }
 
-/// Whether a command came too late by the clock; forces are off from then on.
+/// Turns forces off for good when a command comes too late by the clock.
 void VirtualOmega7::look_at_clock() noexcept {
   if (!on_the_clock_ || !forces_on_) return;
   const std::chrono::duration<double> without_command = Clock::now() - last_command_;

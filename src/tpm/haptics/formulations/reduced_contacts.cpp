@@ -49,10 +49,10 @@ class ReducedLoop final : public ReducedContact, public LoopMaker {
 };
 
 LoopModel element_model(const HilSession& session) {
-  const SceneKeys scene = scene_block().made(session.scene, {session.scene_place});
+  const SceneKeys scene = scene_block().made(session.scene, session.scene_place);
   const Tissue tissue = tissue_of(scene, session.scene_place, {});
   if (scene.organ.kind != OrganKind::star) {
-    throw bad_input(session.scene_place, "is no star",
+    throw bad_input(session.scene_place.where, "is no star",
                     "an organ of the kind star for the model 'element'");
   }
   LoopModel loop;
@@ -95,7 +95,7 @@ std::size_t by_exponentials(const FormulationChoice& choice) {
   return static_cast<std::size_t>(choice.exponentials) - 1;
 }
 
-/// What sees one contact along its push, whatever drives it.
+/// Formulations of one contact along its push, whatever drives it.
 constexpr Capabilities kAlongPush{.network = true,
                                   .depth = true,
                                   .load = true,
@@ -108,7 +108,7 @@ constexpr Capabilities kAlongPush{.network = true,
                                   .stiffening = true,
                                   .any_potential = true,
                                   .regions = true};
-/// What sees one sphere that is moved in space.
+/// Formulations of one sphere that moves in space.
 constexpr Capabilities kInSpace{.network = true,
                                 .depth = true,
                                 .servo = true,

@@ -51,7 +51,7 @@ InverseDevice::~InverseDevice() {
   if (messages_.joinable()) messages_.join();
 }
 
-/// Whether an event means that forces no longer reach the hand.
+/// The fault if an event means that forces no longer reach the hand.
 std::optional<InverseDevice::Fault> InverseDevice::end_of(const InverseEvent& event) {
   if (event.name == "device-disconnected") return Fault::unplugged;
   if (event.name == "device-busy") return Fault::software;

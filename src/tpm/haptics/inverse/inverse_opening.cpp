@@ -1,6 +1,6 @@
 // Declared in tpm/haptics/inverse/inverse_device.hpp.
-// How a session on an Inverse3 begins: the service is found, its device chosen, what acts on a
-// force made neutral and read back.
+// Start of a session on an Inverse3: finds the service, chooses its device, neutralises its
+// settings of forces and reads them back.
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
@@ -166,7 +166,7 @@ void InverseDevice::look_for_other_clients() {
                    printable(device_.id), device_.in_use, printable(device_.control_mode))});
 }
 
-/// What the service says of its devices now, as this session sees them.
+/// The service's current report on its devices, as this session sees them.
 InverseInventory InverseDevice::read_back() {
   if (format_ == InverseFormat::vector) {
     return inventory_from(
@@ -192,14 +192,14 @@ void InverseDevice::make_neutral() {
       (void)http_exchange(format_ == InverseFormat::vector ? address_.port : address_.old_http_port,
                           request.target, request.body, kPatience_s);
     } catch (const Error&) {
-      // What the service says below counts, not what it answers here.
+      // The next report of the service counts, not its answer here.
     }
   }
   if (!requests.empty()) learn_settings();
   require_neutral();
 }
 
-/// What acts on a force or a coordinate, as the service says now.
+/// Reads the service's current settings of forces and coordinates.
 void InverseDevice::learn_settings() {
   const InverseInventory now = read_back();
   const auto found = std::ranges::find(now.devices, device_.id, &InverseDeviceEntry::id);
@@ -257,7 +257,7 @@ void InverseDevice::require_neutral() const {
   }
 }
 
-/// What stays unknown of the settings, or is not this session's to change.
+/// Notes settings that stay unknown or are not this session's to change.
 void InverseDevice::notice_settings() {
   const InverseSettings& s = device_.settings;
   if (!s.gravity_named) {

@@ -91,7 +91,7 @@ Error port_fault(int port, std::string_view what) {
           "a service that is compatible with the Inverse service"};
 }
 
-/// What comes until `end` is among it, the other side is done, or the time is over.
+/// Receives until `end` is among the bytes, the other side is done, or the time is over.
 std::string received(int handle, std::string_view end, LoopbackClock::time_point until) {
   std::string bytes;
   while (bytes.size() < kMostAnswerBytes) {

@@ -63,7 +63,7 @@ class Part {
       if (std::ranges::find(known, name) == known.end()) others.push_back(printable(name, 40));
     }
   }
-  /// What can be shown of a text; empty for anything else.
+  /// Printable part of a text; empty for anything else.
   [[nodiscard]] std::string words(std::size_t most = kMostCharacters) const {
     return json_->is_string() ? printable(json_->get<std::string>(), most) : std::string();
   }

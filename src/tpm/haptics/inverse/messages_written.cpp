@@ -1,5 +1,5 @@
 // Declared in tpm/haptics/inverse/messages.hpp.
-// What client and server of the Inverse protocol say.
+// Messages that client and server of the Inverse protocol write.
 #include <fmt/format.h>
 
 #include "tpm/files/json.hpp"

@@ -17,7 +17,7 @@ constexpr double kSame = 8.0;
 /// In units that make the sums alike.
 constexpr double kPlaceUnit_m = 0.01;
 
-/// What active hands on passive set-ups bring about, for each window, and a quarter more: standard
+/// Extremes for active hands on passive set-ups, for each window, and a quarter more: standard
 /// errors below 0, and the least ratio of what a longer delay leaves unexplained. Found by
 /// simulation (tests/haptics/test_safety_slow.cpp, tests/measure/hands.cpp), not derived.
 struct Usual {

@@ -23,8 +23,8 @@ constexpr std::size_t kRingRows = 1U << 16U;  // 16 s at 4 kHz
 /// In place of the time since which a cycle lasts: the watch has given it up.
 constexpr std::int64_t kLeftBehind = -1;
 
-/// What the threads of a session share. The stuck thread of a cycle that does not end keeps it
-/// alive.
+/// State that the threads of a session share. The stuck thread of a cycle that does not end keeps
+/// it alive.
 struct Shared {
   Shared(std::shared_ptr<HapticDevice> d, std::shared_ptr<ContactModel> m, const ServoSettings& s)
       : device(std::move(d)), model(std::move(m)), settings(s), step(*device, *model, s) {
@@ -243,7 +243,7 @@ bool watch(const std::shared_ptr<Shared>& s, const RealTimeOptions& options,
   return false;
 }
 
-/// What is known of the completed cycles, also if the last one hangs.
+/// Counts of the completed cycles, also if the last one hangs.
 void fill_counts(ServoOutcome& outcome, const Shared& s) {
   outcome.cycles = s.cycles;
   outcome.counts = s.counts;

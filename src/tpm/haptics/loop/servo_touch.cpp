@@ -37,8 +37,8 @@ ServoStep::Cap ServoStep::cap() const noexcept {
   return {limit, ramp < 1.0 ? kRampingIn : kForceLimited};
 }
 
-/// How far the model's tool comes back to the hand in a cycle without force: no faster
-/// than a force may rise.
+/// Distance by which the model's tool returns to the hand in a cycle without force: no faster than
+/// a force may rise.
 double ServoStep::recovery_m() const noexcept {
   return settings_.slew_limit_N_per_s * settings_.period_s / stiffness_N_per_m_;
 }
@@ -51,7 +51,7 @@ void ServoStep::learn_stiffness(double rise_N, double moved_m) noexcept {
       std::clamp(rise_N / moved_m, least_stiffness_N_per_m_, kMost * least_stiffness_N_per_m_);
 }
 
-/// What is sent of a force that the model answers.
+/// Rendered part of a force that the model computed.
 double ServoStep::rendered_N(const ModelForce& model, const Cap& cap, ServoRecord& row) noexcept {
   constexpr double kForgetting = 0.1;
   was_outside_validity_ = !model.valid;

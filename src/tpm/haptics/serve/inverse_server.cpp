@@ -137,7 +137,7 @@ void InverseServer::accept_new(const Socket& listening, bool events) {
   connections_.back()->events = events;
 }
 
-/// What follows from the clock.
+/// Ends a connection or a drive whose time is over.
 void InverseServer::look_at(Connection& c) {
   using Stage = Connection::Stage;
   flush(c);
@@ -152,7 +152,7 @@ void InverseServer::look_at(Connection& c) {
   }
   if (c.stage != Stage::leaving) return;
   if (c.out.empty() && !c.shut) {
-    // What is still under way is taken, so that the system does not withdraw the last words.
+    // Receives the remaining bytes, so that the system does not withdraw the last words.
     (void)::shutdown(c.socket.handle(), SHUT_WR);
     c.shut = true;
   }
@@ -351,7 +351,7 @@ void InverseServer::obey(Connection& c, const InverseCommand& command) {
   if (c.first("reads")) say(c, fmt::format("reads only, client {} drives", driver_));
 }
 
-/// What a client configures. There is neither a gate nor a damping to switch on, and one basis.
+/// Applies a client's settings. There is neither a gate nor a damping to switch on, and one basis.
 void InverseServer::set(Connection& c, const InverseCommand& command) {
   InverseSettings& device = settings_.device.settings;
   const auto stays = [&](const std::string& kind, const std::string& asked, std::string_view kept) {

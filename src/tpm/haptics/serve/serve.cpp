@@ -18,7 +18,7 @@ namespace {
 constexpr double kForEver_s = 1e9;
 constexpr double kCycleTimeout_s = 1.0;  // a machine that stalls ends no server
 
-/// What a session is supervised with, where nobody holds the device.
+/// Supervision of a session where nobody holds the device.
 ServoSettings served_settings(const HilSession& session, const LoopModel& model,
                               const RenderingCheck& rendering, double duration_s) {
   ServoSettings servo = loop_settings(session, model, rendering, false);

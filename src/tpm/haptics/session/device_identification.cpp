@@ -33,8 +33,7 @@ double coulomb_margin_N(const HandleSolution& s) {
 
 enum class Handle { free, held, not_known };
 
-/// Whether the motion is that of a free handle with little friction; says what is in the way
-/// otherwise.
+/// The handle, free and with little friction; otherwise notes the obstacle.
 Handle handle_of(DeviceIdentification& found, const HandleSolution& s) {
   constexpr double kLeastHeld_N_per_m = 3.0, kSurely = 3.0, kMostCoulomb_N = 0.5 * kEdge_N;
   constexpr double kMostMargin_N = 0.025;

@@ -129,7 +129,7 @@ bool is_interrupted(const DeviceIdentifyOptions& options) {
   return ForcesOffGuard::ended_by_signal() || (options.interrupted && options.interrupted());
 }
 
-/// What was missing when a start was given up.
+/// Missing condition when a start was given up.
 std::string not_in_place(const ServoRecord& row, const DeviceLimits& limits,
                          const StartGateSettings& gate) {
   if ((row.flags & kOutOfReach) != 0) {
@@ -266,7 +266,7 @@ void identify(IdentifyRun& run, const std::vector<IdentificationSample>& samples
       {"ended", fmt::format("everything after {}: {}", lasted, run.ended_by)});
 }
 
-/// What would help against an early end of the check before a session.
+/// Advice against an early end of the check before a session.
 const char* help_against(StopCause cause) {
   if (cause == StopCause::not_in_place) return "a handle at rest in the middle of its workspace";
   if (cause == StopCause::unplugged) return "a device that answers (tpm hil devices)";

@@ -94,7 +94,7 @@ std::string fault_of(const JitterCheck& check) {
   return {};
 }
 
-/// What was kept, for how long, and what that time can say.
+/// The rate that was kept, the time, and the bound that follows from it.
 std::string kept_words(const JitterCheck& check) {
   std::string words = fmt::format("kept {} Hz for {} s", significant(check.rate_Hz, 4),
                                   significant(observed_s(check), 4));

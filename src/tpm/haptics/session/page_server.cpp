@@ -102,7 +102,7 @@ class HttpServer final : public httplib::Server {
         status, status.size() + 1, status);
   }
 
-  /// What comes until `most` bytes are passed, `end` is among them or the time is over.
+  /// Receives until `most` bytes have come, `end` is among them or the time is over.
   std::string received(socket_t socket, std::size_t most, PageClock::time_point until,
                        const char* end) const {
     std::string bytes;

@@ -96,7 +96,7 @@ Json json_of(const Plan& plan) {
           {"candidates", std::move(candidates)}};
 }
 
-/// What a plan is asked for that has no answer.
+/// Error of a plan without an answer.
 Error no_model(const Plan& plan) {
   const std::string instead =
       plan.without_budget
@@ -201,7 +201,7 @@ LoopModel offered_loop(const Formulation& formulation, const HilSession& session
     if (outside == 0) break;
   }
   if (found) return std::move(*found);
-  throw bad_input(session.scene_place,
+  throw bad_input(session.scene_place.where,
                   fmt::format("the model '{}' has no answer: {}", formulation.name(), reason),
                   fmt::format("one of {}, {}", kPlannedModel, formulations_that(for_sessions)));
 }

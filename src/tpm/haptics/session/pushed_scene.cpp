@@ -33,17 +33,17 @@ TissueShape shape_of(const Network& network, std::size_t contact, const Eigen::V
 }
 
 SceneContact moved_contact(const HilSession& session, const Tissue& tissue) {
-  if (session.contact.is_null()) return usual_contact(tissue, DocumentPlace{session.scene_place});
-  return parse_contact(session.contact, tissue, DocumentPlace{session.contact_place});
+  if (session.contact.is_null()) return usual_contact(tissue, session.scene_place);
+  return parse_contact(session.contact, tissue, session.contact_place);
 }
 
 PushedScene::PushedScene(const HilSession& session)
     : model(session.model),
-      contact_place(session.contact_place),
+      contact_place(session.contact_place.where),
       tissue(parse_tissue(session.scene, session.scene_place, {})),
       deepest_m(deepest_of(session)) {
-  require_standing(tissue, session.scene_place);
-  if (session.contact.is_null()) require_free_contact(tissue, session.scene_place);
+  require_standing(tissue, session.scene_place.where);
+  if (session.contact.is_null()) require_free_contact(tissue, session.scene_place.where);
   contact = moved_contact(session, tissue);
 }
 

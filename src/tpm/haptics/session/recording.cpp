@@ -197,7 +197,7 @@ HilRecording read_recording(const std::filesystem::path& file) {
   recording.opened = recording_header_block().made(recording.header, at_header);
   const std::string at_session = at_header.where + ": session";
   require_written_out(recording.opened.session, DocumentPlace{at_session});
-  // What has been recorded fitted into its device.
+  // A recorded session did fit into its device.
   DeviceLimits boundless = limits_of("omega7");
   boundless.reach_m = std::numeric_limits<double>::infinity();
   boundless.stop_along_x_m = 0.0;

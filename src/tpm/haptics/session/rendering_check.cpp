@@ -30,7 +30,7 @@ std::optional<Eigen::Vector3d> tangent_at(ContactModel& model, const Eigen::Vect
   const ContactAnswer stays = model.step(push * depth_m);
   const ContactAnswer further = model.step(push * depth_m + motion * kFurther_m);
   if (!stays.valid || !further.valid) return std::nullopt;
-  // What relaxes in a period is left out: it did so in the period before as well.
+  // Relaxation in a period is left out: it also occurred in the period before.
   const Eigen::Vector3d equilibrium_N = stays.force_N - there.force_N;
   return (stays.force_N - further.force_N + equilibrium_N) / kFurther_m;
 }

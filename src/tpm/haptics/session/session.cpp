@@ -89,7 +89,7 @@ double furthest_along_x(const HilSession& session, const Eigen::Vector3d& surfac
   return furthest;
 }
 
-/// How far from the centre of the workspace the hand may be before the session, m. Without a
+/// Largest distance of the hand from the centre of the workspace before the session, m. Without a
 /// surface of its own the session has to fit in from wherever the hand is then.
 double start_room_m(const HilSession& session, const DeviceLimits& device) {
   if (!session.servo.surface_before_hand_m) return device.reach_m;
@@ -149,7 +149,7 @@ void set_tissue(HilSession& session, const SessionModelKeys& model, const Docume
   }
   const std::filesystem::path file =
       tissue.is_string() ? folder / tissue.get<std::string>() : std::filesystem::path();
-  const std::string where = tissue.is_string() ? file.string() : at.where;
+  const DocumentPlace where = tissue.is_string() ? DocumentPlace{file.string()} : at;
   if (by_law) {
     session.law = law_from_json(tissue.is_string() ? read_json(file) : tissue, where);
   } else {
@@ -157,7 +157,7 @@ void set_tissue(HilSession& session, const SessionModelKeys& model, const Docume
     session.scene =
         with_mesh_listed(without_schema_key(tissue.is_string() ? read_json(file) : tissue), where,
                          tissue.is_string() ? file.parent_path() : folder);
-    require_hand_alone(session.scene, {where});
+    require_hand_alone(session.scene, where);
   }
 }
 
@@ -169,7 +169,7 @@ void set_contact(HilSession& session, const SessionModelKeys& model, const Docum
                     "a kind that moves spheres of a scene, such as planned or curves");
   }
   session.contact = model.contact;
-  session.contact_place = at.where;
+  session.contact_place = at;
 }
 
 void set_tolerance_of(HilSession& session, const SessionModelKeys& model,

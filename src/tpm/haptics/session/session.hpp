@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "tpm/base/namespaces.hpp"
+#include "tpm/files/document_place.hpp"
 #include "tpm/files/json.hpp"
 #include "tpm/haptics/device/device_limits.hpp"
 #include "tpm/haptics/device/virtual_plant.hpp"
@@ -62,9 +63,9 @@ struct HilSession {
   Eigen::Vector3d slide = Eigen::Vector3d::UnitX();  ///< unit vector, square to the push, device
   std::string tolerance = "1%";  ///< of a planned model, as set_tolerance() takes it
   Json scene;                    ///< of the tissue; needs no file. Null with a law
-  std::string scene_place;       ///< where the scene stands, for messages: "FILE: key /model/scene"
-  Json contact;                ///< which spheres the tool moves, as in a scene; null: the usual one
-  std::string contact_place;   ///< where that stands
+  DocumentPlace scene_place;     ///< for messages
+  Json contact;  ///< which spheres the tool moves, as in a scene; null: the usual one
+  DocumentPlace contact_place;
   std::optional<LawFile> law;  ///< of the model `law`
   std::vector<SessionPhase> phases;
   /// Forces of the recording whose motion the last phase is, evenly spaced over it; may be empty.

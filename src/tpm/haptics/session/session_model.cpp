@@ -16,7 +16,7 @@ void require_materials(const Formulation& formulation, const HilSession& session
   for (const MaterialNeed need : needs_of(tissue.materials)) needs.push_back(need);
   for (const MaterialNeed need : needs) {
     if (formulation.can().*need) continue;
-    refuse_capability(formulation, need, session.scene_place,
+    refuse_capability(formulation, need, session.scene_place.where,
                       formulations_that([&](const Formulation& other) {
                         return other.can().*need && for_sessions(other);
                       }));

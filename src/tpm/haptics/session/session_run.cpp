@@ -69,7 +69,7 @@ class Markers {
   Json list_ = Json::array();
 };
 
-/// What a session writes while its loop runs.
+/// Files that a session writes while its loop runs.
 struct SessionLog {
   RowLogWriter& rows;
   Markers& markers;

@@ -213,7 +213,7 @@ void add_identity(Document& d, const HilRecording& r) {
   if (!assumed.empty()) d.bullets(std::move(assumed));
 }
 
-/// What a planned model was picked from.
+/// Adds the candidates of a planned model.
 void add_plan(Document& d, const Json& plan) {
   if (plan.is_null()) return;
   const auto number = [](const Json& value, double scale, const char* unit) {

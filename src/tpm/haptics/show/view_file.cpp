@@ -21,7 +21,7 @@ constexpr const char* kShownFiles =
     "a result of tpm simulate (HDF5), a recording of tpm hil run, or law.json, figures.json or "
     "the JSON answer of tpm fit";
 
-/// What the first bytes of a file say.
+/// Kind of a file by its first bytes.
 enum class FirstBytes { json, hdf5, rows, other };
 
 FirstBytes first_bytes(std::string_view bytes) {

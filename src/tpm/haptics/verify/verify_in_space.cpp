@@ -35,7 +35,7 @@ std::vector<BallPlace> places_of_ball(const SurfaceScene& surface, const HilReco
   return places;
 }
 
-/// How far the ball was from the lines between these places, at most.
+/// Largest distance of the ball from the lines between these places.
 double off_the_lines_m(const SurfaceScene& surface, const HilRecording& recording,
                        const RowList& rows, const std::vector<BallPlace>& places) {
   double largest_m = 0.0;

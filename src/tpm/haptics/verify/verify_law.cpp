@@ -48,7 +48,7 @@ std::optional<double> measured_at(const HilSession& session, double time_s) {
   return measured_N[i] + (part - static_cast<double>(i)) * (measured_N[i + 1] - measured_N[i]);
 }
 
-/// What was commanded, and what the law says, beside the recording.
+/// Puts the commanded force and that of the law beside the recording.
 void put_beside_recording(Verification& v, const HilRecording& recording, const RowList& rows) {
   const HilSession& session = recording.session;
   if (session.measured_N.size() < 2) return;

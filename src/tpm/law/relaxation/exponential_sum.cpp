@@ -230,7 +230,7 @@ void ExponentialSum::springpots_in_series(double alpha, double beta, double tau_
   const double whole = std::nearbyint(steps);
   const PairWeight weight(alpha, beta, steps - whole, step_);
   const long first = first_ + std::lround(whole);
-  // What the sum of the rates lacks of G(t_max), and of the integral over [0, t_min].
+  // Remainder of G(t_max), and of the integral over [0, t_min], beyond the sum of the rates.
   PairValue constant = pair_relaxation(alpha, beta, t_max_s_ / tau_s);
   PairValue dashpot = pair_relaxation_mean(alpha, beta, t_min_s_ / tau_s).times(t_min_s_);
   for (std::size_t j = 0; j < rates_.size(); ++j) {

@@ -50,7 +50,7 @@ double power_series(double alpha, double beta, double z) {
   return sum;
 }
 
-/// What an exponential of the rate r contributes, as a function of s = ln(r t).
+/// Contribution of an exponential of the rate r as a function of s = ln(r t).
 enum class Response { step, ramp, slope };
 
 /// exp(-r t);  (1 - exp(-r t))/(r t);  r t exp(-r t).
@@ -70,8 +70,8 @@ std::complex<double> contribution(Response response, std::complex<double> s) {
   return response == Response::ramp ? (1.0 - std::exp(-rt)) / rt : rt * std::exp(-rt);
 }
 
-/// What the trapezoidal rule misses because of the two poles of the spectrum, which lie halfway
-/// between nodes at s = log_t +- i height. As alpha -> 1 it becomes the whole answer.
+/// Error of the trapezoidal rule due to the two poles of the spectrum, which lie halfway between
+/// nodes at s = log_t +- i height. As alpha -> 1 it becomes the whole answer.
 double pole_term(Response response, const RelaxationSpectrum& spectrum, double log_t) {
   const double height = spectrum.pole_height();
   if (height >= 0.5 * pi) return 0.0;  // below exp(-pi^2/h)

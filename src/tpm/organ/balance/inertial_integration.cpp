@@ -112,7 +112,8 @@ void InertialIntegration::use_elimination() {
 }
 
 void InertialIntegration::watch_gaps() {
-  // What Newton's iteration leaves of places shows in contact forces multiplied by their stiffness.
+  // The residual of Newton's iteration in places appears in contact forces, multiplied by their
+  // stiffness.
   const BondSystem& bonds = equation_.tissue().bonds();
   const auto contacts = static_cast<Eigen::Index>(bonds.contact_count());
   const double stiffer = bonds.stiffness().tail(contacts).maxCoeff() /

@@ -49,7 +49,7 @@ struct Span {
          span.z[s] * (ub[kDown + s] - ua[kDown + s]);
 }
 
-/// What a bond pulls its ends with: the first along it, the other against.
+/// Force of a bond on its ends: the first along it, the other against.
 using Pull = std::array<double, kSphere>;
 
 [[gnu::always_inline]] inline void pull_ends(const Pull& pull, double* a, double* b) {
@@ -182,7 +182,7 @@ struct LaneBondKernels {
   using Data = LaneBonds::Data;
   using Lanes = std::array<double, kLanes>;
 
-  /// What a linear bond pulls with, added to its ends.
+  /// Adds the force of a linear bond to its ends.
   [[gnu::always_inline]] static void pull_linear(const Data& bond, const Span& span,
                                                  const double* viscous, double* f) {
     Lanes share;

@@ -18,7 +18,7 @@ constexpr double kSafeguard = 0.1;
 constexpr double kLeastForcing = 1e-10;
 constexpr double kTired = 1.5;  // growth of the iterations that makes a preconditioner too old
 
-/// How exactly the next step is worth solving.
+/// Tolerance of the next step's linear solve.
 class Forcing {
  public:
   explicit Forcing(double target) : adjoint_(target) {}

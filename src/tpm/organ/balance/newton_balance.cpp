@@ -46,7 +46,7 @@ EquilibriumSearch newton_balance(const BondSystem& bonds, const Constraints& con
     if (search.converged || !search.stable) return search;
     ++search.iterations;
     const double slope = -force.cwiseProduct(step).sum();
-    // What rounding leaves of the potential is not to stop the last steps.
+    // Rounding of the potential must not stop the last steps.
     const double rounding = 1e-14 * std::abs(energy);
     double length = 1.0;
     for (int halvings = 0;; ++halvings, length *= 0.5) {

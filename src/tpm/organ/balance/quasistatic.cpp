@@ -107,7 +107,7 @@ class Run {
     stages_.begin(state_, first_step_s(first_change_s()), protocol_.peak());
   }
 
-  /// How long the first piece takes in which the imposed value changes gradually, s.
+  /// Duration of the first piece in which the imposed value changes gradually, s.
   [[nodiscard]] double first_change_s() const {
     const auto knots = path().knots();
     for (std::size_t k = 0; k + 1 < knots.size(); ++k) {

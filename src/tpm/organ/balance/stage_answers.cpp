@@ -1,5 +1,5 @@
 // Declared in tpm/organ/balance/stage_balance.hpp.
-// What StageBalance answers of the step that it has found: responses, states, heat and work.
+// Results of a step of StageBalance: responses, states, heat and work.
 #include <boost/math/quadrature/gauss.hpp>
 #include <cmath>
 

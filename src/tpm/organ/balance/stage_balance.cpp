@@ -19,7 +19,7 @@ constexpr double kMixingShare = 0.8;  // of what relaxes on average: what relaxe
 constexpr double kHopeless = 10.0;    // times the tolerance: an error that no balance mends
 constexpr int kLastHopeless = 2;      // iterations after which only the balance decides
 constexpr Eigen::Index kAndersonDepth = 7;
-// How far what is driven may go at one step of a load: beyond, it may have snapped to another
+// Largest motion of a driven sphere in one step of a load: beyond, it may have snapped to another
 // place.
 constexpr double kLongestMove = 0.25;    // of a bond
 constexpr double kSnap = 2.0;            // times what the stiffness says
@@ -136,7 +136,7 @@ std::optional<std::vector<double>> StageBalance::furthest_depth_changes_m(
     const double expected_m =
         std::abs(change * tissue_.unit_field(state, viscous_state, g).stiffness);
     if (expected_m > longest_m) return std::nullopt;
-    // What moves beside a load moves it, too: by how much is not known from the load alone.
+    // Other motions beside a load move it, too: by how much is not known from the load alone.
     furthest_m[g] = path.single() ? std::min(kSnap * expected_m, longest_m) : longest_m;
   }
   return furthest_m;

@@ -39,7 +39,7 @@ std::optional<ContactChange> StageBalance::contact_change(double tolerance) cons
   std::optional<ContactChange> first;
   for (std::size_t i = 0; i < contacts.size(); ++i) {
     const bool closed = closed_[i] != 0;
-    // How far on the wrong side it is: a closed contact that pulls, an open one that overlaps.
+    // Size of the violation: a closed contact that pulls, an open one that overlaps.
     const auto wrong = [&](double fraction) {
       const double gap = gap_m(contacts[i], fraction);
       return closed ? gap : -gap;

@@ -15,7 +15,7 @@ constexpr double kSettled = 1e-14;  // of the largest approach speed
 // Roundings of a speed in a sum of three products: no approach slower than that is told from none.
 constexpr double kImpulseRoundings = 8.0 * std::numeric_limits<double>::epsilon();
 
-/// What an impulse along the normal changes.
+/// Change due to an impulse along the normal.
 struct Answer {
   Eigen::Vector3d of_sphere, of_tool;  ///< velocities per impulse, 1/kg
   double of_gap = 0.0;                 ///< rate of the gap per impulse, 1/kg

@@ -78,7 +78,7 @@ Vector3d MeshSurface::mean_normal(const Corner& at, bool smooth) const {
   return sum.normalized();
 }
 
-/// What tells inside from outside at the nearest point (Baerentzen and Aanaes 2005).
+/// Normal that separates inside from outside at the nearest point (Baerentzen and Aanaes 2005).
 Vector3d MeshSurface::pseudonormal(const TrianglePoint& at) const {
   for (int i = 0; i < 3; ++i) {
     const bool before_zero = at.weights[(i + 1) % 3] <= 0.0;

@@ -16,7 +16,7 @@ namespace tpm::organ {
 
 namespace {
 
-/// What nanoflann asks of a set of points.
+/// A set of points as nanoflann reads it.
 class PointCloud {
  public:
   explicit PointCloud(const Positions& points) : points_(points) {}

@@ -261,7 +261,7 @@ std::size_t add_support(const Surface& surface, SolidFilling& filling, int wante
   return static_cast<std::size_t>(added.cols());
 }
 
-/// What an outer sphere wants below it.
+/// Wanted neighbour below an outer sphere.
 struct Wanted {
   std::size_t inside;
   double steadiness;

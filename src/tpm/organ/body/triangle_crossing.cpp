@@ -93,7 +93,7 @@ Corners corners_of(const TriangleMesh& mesh, int triangle) {
   return {mesh.corner(triangle, 0), mesh.corner(triangle, 1), mesh.corner(triangle, 2)};
 }
 
-/// Which corners of `a` are corners of `b` too.
+/// Corners of `a` that are corners of `b` too.
 std::array<bool, 3> shared_corners(const TriangleMesh& mesh, int a, int b) {
   std::array<bool, 3> shared{};
   for (std::size_t i = 0; i < 3; ++i) {

@@ -37,7 +37,7 @@ void Constraints::impose(std::size_t sphere, const Eigen::Vector3d& direction) {
   const Eigen::Vector3d free = p * direction;
   const double part = free.norm();
   if (part > 0.0) p -= free * free.transpose() / (part * part);
-  // What rounding leaves of a direction that is gone would become a soft one.
+  // Rounding of a direction that is gone would become a soft one.
   const bool held = p.trace() < 0.5;
   if (held) p.setZero();
   state_[sphere] = held ? State::fixed : State::partly;

@@ -53,7 +53,7 @@ double cosine_squared(const Organ& organ, std::size_t sphere, std::size_t other)
   return cosine * cosine;
 }
 
-/// What a sphere's sum allows each of its bonds; 0 where the sphere has no say.
+/// Share that a sphere's sum allows each of its bonds; 0 where the sphere has no say.
 double share_at(const BondSums& sums, BondKind kind) {
   if (kind == BondKind::lateral) return 2.0 / sums.lateral_count;
   return sums.radial > 0.0 ? 1.0 / sums.radial : 0.0;

@@ -19,7 +19,7 @@ const double kSameFace = std::sqrt(3.0) / 2.0;  // cosine of 30 degrees
 constexpr std::size_t kMostPlaces = 5;
 constexpr double kNoHold = 1e-12;  // of the target: a stiffness below is none
 
-/// What the spacing law multiplies every factor by.
+/// Factor of the spacing law.
 double spacing_scale(const Network& network) {
   return network.options.spacing_law == SpacingLaw::continuum
              ? network.organ.spacing / network.options.reference_spacing_m
@@ -113,7 +113,7 @@ std::vector<double> least_hold(const Network& network, const Constraints& constr
   const double scale = spacing_scale(network);
   std::vector<double> least(organ.size());
   for (std::size_t i = 0; i < organ.size(); ++i) {
-    // What is fixed counts as held by the target.
+    // Fixed spheres count as held by the target.
     const Eigen::Matrix3d& p = constraints.projector(i);
     const Eigen::Matrix3d own = p * (held[i] / scale) * p + Eigen::Matrix3d::Identity() - p;
     const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> solver(own, Eigen::EigenvaluesOnly);

@@ -24,7 +24,7 @@ LateralNeighbours lateral_neighbours(const Network& network) {
   return neighbours;
 }
 
-/// What each neighbour's value adds to the least-squares fit's value at a sphere.
+/// Weight of each neighbour's value in the least-squares fit's value at a sphere.
 Eigen::VectorXd shares_of_fit(const Organ& organ, Eigen::Index sphere,
                               const std::vector<std::uint32_t>& neighbours) {
   const Eigen::Vector3d normal = organ.normal.col(sphere);

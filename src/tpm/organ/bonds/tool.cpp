@@ -18,7 +18,8 @@ Offset offset(const Eigen::Vector3d& from, const Eigen::Vector3d& to,
   return {along, (apart - along * direction).norm()};
 }
 
-/// How far before a sphere's centre, along its way, the tool touches it; none if it passes by.
+/// Distance before a sphere's centre, along its way, at which the tool touches it; none if it
+/// passes by.
 std::optional<double> standoff(const ToolShape& shape, double across, double radius) {
   if (shape.kind == ToolKind::punch) {
     return across <= shape.radius_m ? std::optional(radius) : std::nullopt;

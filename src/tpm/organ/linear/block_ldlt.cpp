@@ -177,7 +177,7 @@ bool BlockLdlt::eliminate_diagonal(const DensePanel& block, std::size_t size, st
     Eigen::Matrix3d& pivot = pivot_[place];
     for (std::size_t j = 0; j < 3; ++j) {
       for (std::size_t i = 0; i < 3; ++i) {
-        // What stands above the diagonal has no meaning.
+        // Entries above the diagonal have no meaning.
         pivot(static_cast<Eigen::Index>(i), static_cast<Eigen::Index>(j)) =
             a[(k + std::min(i, j)) * stride + k + std::max(i, j)];
       }

@@ -87,7 +87,7 @@ void BlockPattern::choose_parts() {
 
 void BlockPattern::lay_out() {
   layout_.resize(fronts_.fronts().size());
-  // What a part leaves lies still until a later front takes it: each has stacks of its own.
+  // The remainder of a part waits until a later front takes it: each has stacks of its own.
   std::array<std::size_t, 2> bottom{};
   for (Part& part : parts_) {
     std::array<std::size_t, 2> top = bottom;

@@ -51,7 +51,7 @@ bool IncompleteCholesky::factorise(const BlockRows<3, 3>& matrix) {
         inverse_[i] = factor.solve(Eigen::Matrix3d::Identity());
         break;
       }
-      // What the rows i and k have in common to the left of k.
+      // Common entries of the rows i and k to the left of k.
       std::size_t q = first;
       for (std::size_t s = lower_.begin[k]; s < lower_.begin[k + 1]; ++s) {
         while (q < lower_.column.size() && lower_.column[q] < lower_.column[s]) ++q;

@@ -195,7 +195,7 @@ std::string checkpoint_identity(const ExperimentScene& scene) {
       fmt::format("{}\n{}\n{}\n", version(), scene.formulation.mass_spring, scene.text);
   bytes.append(reinterpret_cast<const char*>(at.data()),
                sizeof(double) * static_cast<std::size_t>(at.size()));
-  // What files beside the scene say: motions of contacts.
+  // Content of files beside the scene: motions of contacts.
   for (const SceneContact& contact : scene.contacts) {
     if (!contact.protocol) continue;
     const auto knots = contact.protocol->knots();

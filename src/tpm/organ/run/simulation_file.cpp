@@ -49,7 +49,7 @@ void write_provenance(const ExperimentScene& scene, const SimulationRun& run, Hd
   file.numbers("/probe/direction", list_of(scene.probe().direction));
 }
 
-/// What does not change of the tools, one row each.
+/// Constant data of the tools, one row each.
 void write_tools(const DrivenNetwork& network, Hdf5Writer& file) {
   if (network.tools.empty()) return;
   std::vector<std::int32_t> kind;
@@ -88,7 +88,7 @@ void write_tool_states(const DrivenNetwork& network, const QuasiStaticState& sta
   file.integers(group + "/tools/touching", touching, 1);
 }
 
-/// What spheres with mass have besides a curve: impacts, and what contacts do to the numbers.
+/// Data of spheres with mass besides a curve: impacts, and the effect of contacts on the numbers.
 void write_motion(const SimulationRun& run, Hdf5Writer& file) {
   std::vector<double> time, impulse, on_tissue;
   for (const ProbeImpact& impact : run.record.impacts) {

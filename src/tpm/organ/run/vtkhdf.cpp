@@ -40,7 +40,7 @@ void write_topology(const Network& network, Hdf5Writer& file) {
   file.integers("/VTKHDF/CellData/kind", kind, 1);
 }
 
-/// What does not change in time: once, and every time begins at its beginning.
+/// Fields that are constant in time: written once, and every time begins at their beginning.
 void write_still_fields(const Tissue& tissue, std::size_t outputs, Hdf5Writer& file) {
   const Organ& organ = tissue.network.organ;
   std::vector<std::int32_t> number, layer, constraint(organ.size(), 0);

@@ -53,7 +53,7 @@ Eigen::Vector3d direction_of(const ContactKeys& contact, const Organ& organ, std
   return -organ.normal.col(static_cast<Eigen::Index>(sphere));
 }
 
-/// What is wider than the organ acts like what is as wide: such a size is a slip of the unit.
+/// A size wider than the organ acts like one as wide: it is a slip of the unit.
 double radius_of(double radius, const Organ& organ, const DocumentPlace& place) {
   const double extent =
       (organ.position.rowwise().maxCoeff() - organ.position.rowwise().minCoeff()).norm() +

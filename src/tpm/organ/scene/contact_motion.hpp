@@ -1,5 +1,6 @@
 #pragma once
-// What is imposed on the contacts of a scene, on all or on one: the keys, and the protocol.
+// Motions and loads imposed on the contacts of a scene, on all or on one: the keys, and the
+// protocol.
 #include <filesystem>
 
 #include "tpm/base/namespaces.hpp"

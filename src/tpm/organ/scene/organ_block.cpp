@@ -26,7 +26,7 @@ constexpr double kUsualSpacing_m = 0.020;
 constexpr auto kFillingWords =
     std::to_array<Word<Filling>>({{Filling::shell, "shell"}, {Filling::solid, "solid"}});
 
-/// What a function of the folder `network` returns; its errors get the place of the block.
+/// Result of a function of the folder `network`; its errors get the place of the block.
 template <class Make>
 Organ made(const DocumentPlace& place, Make&& make) {
   try {

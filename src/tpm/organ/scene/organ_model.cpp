@@ -17,7 +17,7 @@ namespace {
 constexpr double kDerivativeTolerance = 1e-5;  // of relative changes, in parts of the largest
 constexpr double kDifference = 1e-5;           // of a parameter, where laws are differentiated
 
-/// How the organ of a scene and one of another spacing answer each other.
+/// Similarity of the organ of a scene and one of another spacing.
 struct Similarity {
   double size;   ///< of this organ in parts of the scene's
   double power;  ///< forces go with this power of the size
@@ -31,8 +31,8 @@ struct Similarity {
   }
 };
 
-/// What a run can be differentiated by; moduli in units of E2, so that all have the response's
-/// size.
+/// Variables by which a run can be differentiated; moduli in units of E2, so that all have the
+/// response's size.
 enum Basis : int { by_E1, by_Eprime, by_log_tau, by_log_imposed, kBasis };
 
 /// Derivatives of a response along changes of the parameters, one column for each.

@@ -27,7 +27,7 @@ Network joined(OrganBlock block, const NetworkOptions& options, const std::strin
   return join(std::move(block.organ), kElement, options, where);
 }
 
-/// What is fixed if the scene does not say.
+/// Anchors of a scene that states none.
 std::vector<AnchorKeys> usual_anchors(bool star, bool liver) {
   if (star) return {{.kind = AnchorKind::spheres, .spheres = {1, 3, 4}}};
   if (liver) return {{.kind = AnchorKind::far_side, .spheres = {}}};
@@ -186,9 +186,8 @@ void scale_to_tissue(double E_Pa, std::optional<double> nu, Tissue& tissue,
 
 }  // namespace
 
-Tissue tissue_of(const SceneKeys& scene, std::string_view where,
+Tissue tissue_of(const SceneKeys& scene, const DocumentPlace& place,
                  const std::filesystem::path& folder) {
-  const DocumentPlace place{std::string(where)};
   OrganBlock organ = organ_of(scene.organ, place.key("organ"), folder);
   const bool star = organ.star;
   Tissue tissue;
@@ -225,17 +224,17 @@ Tissue tissue_of(const SceneKeys& scene, std::string_view where,
   return tissue;
 }
 
-Tissue parse_tissue(const Json& scene, std::string_view where,
+Tissue parse_tissue(const Json& scene, const DocumentPlace& place,
                     const std::filesystem::path& folder) {
-  const Json document = checked(scene, scene_kind(), where);
-  return tissue_of(scene_block().made(document, DocumentPlace{std::string(where)}), where, folder);
+  const Json document = checked(scene, scene_kind(), place);
+  return tissue_of(scene_block().made(document, place), place, folder);
 }
 
-Json with_mesh_listed(Json scene, std::string_view where, const std::filesystem::path& folder) {
-  scene = checked(std::move(scene), scene_kind(), where);
-  const SceneKeys keys = scene_block().made(scene, DocumentPlace{std::string(where)});
+Json with_mesh_listed(Json scene, const DocumentPlace& place, const std::filesystem::path& folder) {
+  scene = checked(std::move(scene), scene_kind(), place);
+  const SceneKeys keys = scene_block().made(scene, place);
   if (keys.organ.kind != OrganKind::mesh) return scene;
-  const Organ organ = tissue_of(keys, where, folder).network.organ;
+  const Organ organ = tissue_of(keys, place, folder).network.organ;
   Json spheres = Json::array();
   for (std::size_t i = 0; i < organ.size(); ++i) {
     const auto column = static_cast<Eigen::Index>(i);

@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "tpm/base/namespaces.hpp"
+#include "tpm/files/document_place.hpp"
 #include "tpm/files/json.hpp"
 #include "tpm/organ/bonds/bond_system.hpp"
 #include "tpm/organ/bonds/constraints.hpp"
@@ -52,16 +53,16 @@ struct Tissue {
 
 /// Reads the blocks organ, bonds, material, anchors and sliders of a scene
 /// (schemas/scene.schema.json, docs/network.md).
-/// @param where for messages, usually the file
+/// @param place for messages, usually the file
 /// @param folder that a mesh path is relative to
 /// Throws Error(bad_input) with the key.
-[[nodiscard]] Tissue parse_tissue(const Json& scene, std::string_view where,
+[[nodiscard]] Tissue parse_tissue(const Json& scene, const DocumentPlace& place,
                                   const std::filesystem::path& folder);
 
 /// The scene with the spheres that fill a mesh listed in the mesh's place, its name and SHA-256 in
 /// the description: it needs no file beside it any more. Other scenes are returned as they are.
 /// Throws as parse_tissue does.
-[[nodiscard]] Json with_mesh_listed(Json scene, std::string_view where,
+[[nodiscard]] Json with_mesh_listed(Json scene, const DocumentPlace& place,
                                     const std::filesystem::path& folder);
 
 /// read_json and parse_tissue.

@@ -31,7 +31,7 @@ struct SceneKeys {
 
 /// The tissue that a scene says. Throws Error(bad_input) with the key.
 /// @param folder that a mesh path is relative to
-[[nodiscard]] Tissue tissue_of(const SceneKeys& scene, std::string_view where,
+[[nodiscard]] Tissue tissue_of(const SceneKeys& scene, const DocumentPlace& place,
                                const std::filesystem::path& folder);
 
 }  // namespace tpm::organ

@@ -23,7 +23,7 @@ struct FreeIda {
   void operator()(void* memory) const { IDAFree(&memory); }
 };
 
-/// What the callbacks of an integrator reach.
+/// Data of an integrator's callbacks.
 struct Side {
   NewtonSystem& system;
   long most_rates;
@@ -47,7 +47,7 @@ Side& side(void* user_data) {
   return *static_cast<Side*>(user_data);
 }
 
-/// How a run ended whose integrator gave up.
+/// End of a run whose integrator gave up.
 MethodEnd end_of(const Side& side, bool newton) {
   if (side.exhausted) return MethodEnd::too_much_work;
   if (side.last != MethodEnd::completed) return side.last;

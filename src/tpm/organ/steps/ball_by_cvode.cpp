@@ -54,7 +54,7 @@ class ViscousNetwork {
   }
 
  private:
-  // What balances are exact to: 1e-12 of it, times the stiffness of all contacts of the ball.
+  // Accuracy of balances: 1e-12 of it, times the stiffness of all contacts of the ball.
   static constexpr double kDisplaced_m = 1e-3;
 
   [[nodiscard]] Eigen::Vector3d ball_at(double time_s) const {

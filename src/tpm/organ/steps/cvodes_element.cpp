@@ -16,7 +16,7 @@
 namespace tpm::organ {
 namespace {
 
-/// What the state is differentiated with respect to: the five material parameters and the factor
+/// Variables by which the state is differentiated: the five material parameters and the factor
 /// l0/A0 that turns a load into stress times length.
 enum StateParameter : int { sE1, sE2, sEprime, sEta1, sSpacing, sLoadFactor, kStateParameters };
 

@@ -301,7 +301,7 @@ class ElementSystem final : public StageSystem,
 
   /// Without masses: puts the sphere where it is for what is imposed and its viscous elongation.
   MethodEnd place_at(double imposed, double y) {
-    // What is imposed at one time may have been found in two ways.
+    // The value imposed at one time may have been computed in two ways.
     constexpr double kRounding = 1e-13;
     const bool same = std::abs(known_.imposed - imposed) <= kRounding * peak_;
     if (same && known_.y == y) return MethodEnd::completed;

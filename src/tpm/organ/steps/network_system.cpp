@@ -17,7 +17,7 @@ namespace {
 using Spheres = Eigen::Map<Eigen::Matrix3Xd>;
 using ConstSpheres = Eigen::Map<const Eigen::Matrix3Xd>;
 
-/// What networks with and without masses have in common.
+/// Common part of networks with and without masses.
 class NetworkSystem : public StageSystem, public ProjectionSystem, public NewtonSystem {
  public:
   NetworkSystem(const DrivenNetwork& network, const Protocol& protocol)
@@ -39,7 +39,7 @@ class NetworkSystem : public StageSystem, public ProjectionSystem, public Newton
  protected:
   [[nodiscard]] Eigen::Index columns() const { return rest_.cols(); }
 
-  /// What the bonds pull with where they have the y.
+  /// Sets the viscous forces of the bonds at the state y.
   void set_viscous_state(const ConstVector& y) {
     viscous_.set_mean(y, viscous_state_.offset);
     viscous_state_.relaxation_factor = 0.0;
@@ -50,7 +50,7 @@ class NetworkSystem : public StageSystem, public ProjectionSystem, public Newton
     viscous_state_.relaxation_factor = viscous_.mean_relaxation_factor(relaxation_factor);
   }
 
-  /// What is imposed at one time, found in two ways.
+  /// True if both are the value imposed at one time, computed in two ways.
   [[nodiscard]] bool is_same(double a, double b) const {
     constexpr double kRounding = 1e-13;
     return std::abs(a - b) <= kRounding * peak_;
@@ -236,7 +236,7 @@ class MasslessNetwork final : public NetworkSystem, public BalanceSystem {
     tissue_.load(imposed(t), load_);
     balance_forces(bonds_, put_, viscous_state_, load_, force_);
     tissue_.constraints().project(force_);
-    // What is not free has to stay 0.
+    // Constrained components must stay 0.
     Eigen::Matrix3Xd bound = ConstSpheres(place.data(), 3, columns());
     tissue_.constraints().project(bound);
     Spheres left(imbalance.data(), 3, columns());

@@ -46,7 +46,7 @@ std::string number_text(const AuditQuantity& quantity) {
   return with_unit(significant(quantity.value, 4), quantity.unit);
 }
 
-/// What a consequence may quote.
+/// Values that a consequence may quote.
 Placeholders placeholders(const ClaimReader& claim, const Finding& finding) {
   Placeholders values;
   values["printed"] = finding.compared();

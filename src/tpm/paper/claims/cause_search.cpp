@@ -87,7 +87,7 @@ void CauseSearch::add_choice(const AuditInput& input, const PrintedSymbol& symbo
   cause.recomputed = sum;
   const bool mixed =
       std::adjacent_find(choice.begin(), choice.end(), std::not_equal_to<>()) != choice.end();
-  cause.text = symbol.words + " = ";
+  cause.text = symbol.summary + " = ";
   for (std::size_t t = 0; t < (mixed ? choice.size() : 1); ++t) {
     if (t > 0) cause.text += ", ";
     cause.text += chosen_text(symbol, choice[t]);

@@ -57,7 +57,8 @@ const Block<PrintedSymbol>& symbol_block() {
   static const Block<S> block(
       "symbol", "a named number of the paper",
       {required(key("name", &S::name, name_text(), "in formulas")),
-       key("words", &S::words, text(1), "what people call it, such as load; the name if left out"),
+       key("summary", &S::summary, text(1),
+           "its name in texts, such as load; the name if left out"),
        required(key("value", &S::value, text(1), "as printed, or a formula such as pi/6")),
        key("unit", &S::unit, unit_text(), "of the value; left out for a plain number"),
        where_key(&S::where), quote_key<S>(),
@@ -236,7 +237,7 @@ const Block<ClaimsKeys>& claims_block() {
 
 void read_numbers(PrintedSymbol& symbol, const Evaluator& evaluator, std::string_view file) {
   const std::string at = fmt::format("{}: symbol '{}'", file, symbol.name);
-  if (symbol.words.empty()) symbol.words = symbol.name;
+  if (symbol.summary.empty()) symbol.summary = symbol.name;
   symbol.si = printed_si(symbol.value, symbol.unit, evaluator, at);
   for (PrintedAlternative& other : symbol.also) {
     other.si = printed_si(other.value, symbol.unit, evaluator, at);

@@ -23,8 +23,8 @@ struct PrintedAlternative {
 /// A named number of the paper.
 struct PrintedSymbol {
   std::string name;
-  std::string words;  ///< for people, "load" of load_small; the name if the file says none
-  std::string value;  ///< as printed, e.g. "12" or "pi/6"
+  std::string summary;  ///< in texts, "load" of load_small; the name if the file says none
+  std::string value;    ///< as printed, e.g. "12" or "pi/6"
   Unit unit{"", Dimension::dimensionless, 1.0};  ///< of a plain number unless said
   double si = 0.0;
   std::string where;

@@ -36,7 +36,7 @@ std::string percent(double share) {
   return percent_number(share) + " %";
 }
 
-/// What was imposed: "4 mm at 2 mm/s", "0.98 N", "static".
+/// The imposed condition: "4 mm at 2 mm/s", "0.98 N", "static".
 std::string condition_words(const StudyCondition& c) {
   switch (c.kind) {
     case Kind::ramp_hold:
@@ -252,7 +252,7 @@ Table answers_table(const OrganStudy& study, std::size_t fit) {
   return table;
 }
 
-/// What a reader must know of the fits: each remark once, with the fits that carry it.
+/// Remarks on the fits: each once, with the fits that carry it.
 Table remarks_table(const OrganStudy& study) {
   Table table{"Remarks of the fits.", {{"remark"}, {"fits"}}};
   for (const TissueFit& made : study.fits) {
@@ -285,7 +285,7 @@ std::string searched_words(const OrganStudy& study) {
       listed(study.config.fits.front().configs.front().parameters, range, "; "));
 }
 
-/// How much each tissue differs from the first at one material.
+/// Difference of each tissue from the first at one material.
 Table costs_table(const OrganStudy& study) {
   Table table{fmt::format("Least and largest difference from '{}' at one material.",
                           study.config.tissues.front().name),

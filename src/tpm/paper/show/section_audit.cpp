@@ -25,7 +25,7 @@ Tone tone_of_finding(AuditVerdict verdict) {
   return Tone::bad;
 }
 
-/// What follows from the finding and, where the digits betray it, how the number came about.
+/// Consequence of the finding and, where the digits betray it, the origin of the number.
 std::string consequence(const Finding& finding) {
   std::string text = finding.consequence;
   if (!finding.causes.empty()) {
@@ -45,7 +45,7 @@ std::string counts(const AuditReport& audit) {
   return fmt::format("{}", fmt::join(parts, ", "));
 }
 
-/// What stands in print, or what one printed equation gives.
+/// The printed number, or that of one printed equation.
 std::string compared_words(const Finding& finding) {
   return finding.printed.empty() ? fmt::format("({})", finding.derived) : finding.printed;
 }

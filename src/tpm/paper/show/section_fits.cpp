@@ -37,7 +37,7 @@ Table estimates_table(const FitResult& fit) {
   return table;
 }
 
-/// What neither the summary nor a table says.
+/// Findings that neither the summary nor a table states.
 std::vector<Cell> findings(const FitResult& fit) {
   std::vector<Cell> items;
   if (!fit.weakest_words.empty()) items.push_back({fit.weakest_words});

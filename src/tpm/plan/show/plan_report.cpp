@@ -133,7 +133,7 @@ std::string relevance_text(const PlanRelevance& r) {
                      r.matters ? "matters" : "does not matter", share_text(*r.error), note);
 }
 
-/// How the number of masses_left_out was found.
+/// Source of the number masses_left_out.
 std::string masses_note(const Plan& plan) {
   std::string note = "by the linear network";
   for (const PlanRelevance& r : plan.relevance) {
@@ -142,8 +142,8 @@ std::string masses_note(const Plan& plan) {
   return note.empty() ? note : fmt::format(" ({})", note);
 }
 
-/// What asks for no servo and no budget of time can run the network itself: the cheapest candidate
-/// with the whole network that meets the tolerance, and how long it takes, s.
+/// Without a servo or a budget of time the network itself can run: the cheapest candidate with the
+/// whole network that meets the tolerance, and its time, s.
 std::optional<std::pair<std::string, double>> run_offline(const Plan& plan) {
   if (plan.request.budget.rate_Hz || plan.request.budget.wall_s_per_s) return std::nullopt;
   const auto runs = [](const PlannedCandidate& c) {
@@ -154,8 +154,8 @@ std::optional<std::pair<std::string, double>> run_offline(const Plan& plan) {
   return std::pair{found->name, *found->cost_s_per_s * plan.duration_s};
 }
 
-/// How far the verified error of the pick is below the tolerance. Beyond the most that is told it
-/// says nothing: such an error is rounding.
+/// Ratio of the tolerance to the verified error of the pick, limited: beyond, the error is
+/// rounding.
 double margin(const Plan& plan) {
   return std::min(
       plan.request.tolerance / std::max(shown_error(plan, *plan.chosen().verified_error), 1e-300),
@@ -203,7 +203,7 @@ std::string choice_text(const Plan& plan) {
   return text;
 }
 
-/// What is planned, and what is asked for.
+/// The planned scene and the request.
 std::string subject_text(const Plan& plan) {
   const PlanRequest& request = plan.request;
   std::string text = fmt::format("{}: {} spheres, {} bonds, {} s\n", plan.title, plan.spheres,
@@ -231,7 +231,7 @@ std::vector<std::string> text_lines(const std::string& text) {
   return lines;
 }
 
-/// What matters and what does not, each in one line.
+/// Relevant and irrelevant effects, each in one line.
 std::vector<std::string> relevance_lines(const Plan& plan) {
   std::string matters, not_found, rest;
   const auto add = [](std::string& to, const std::string& words) {
@@ -263,7 +263,7 @@ std::vector<const PlannedCandidate*> run_candidates(const Plan& plan) {
   return run;
 }
 
-/// What masses would change, where no error that is shown counts it.
+/// Effect of masses, where no error that is shown counts it.
 std::optional<double> masses_uncounted(const Plan& plan) {
   if (plan.inertial || plan.masses_left_out) return std::nullopt;
   for (const PlanRelevance& r : plan.relevance) {

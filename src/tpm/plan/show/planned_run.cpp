@@ -1,5 +1,5 @@
 // Declared in tpm/plan/show/plan_report.hpp.
-// What a planned model answered.
+// Response of a planned model.
 #include <fmt/format.h>
 
 #include "tpm/base/text.hpp"
@@ -17,7 +17,7 @@ std::string model_words(const PlannedCandidate& c) {
                      c.settings);
 }
 
-/// What is known of the response where the claim is about displacements; else empty.
+/// Knowledge of the response where the claim is about displacements; else empty.
 std::string response_words(const Plan& plan) {
   const auto& error = plan.chosen().verified_response_error;
   if (!error) return {};

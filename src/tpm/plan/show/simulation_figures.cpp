@@ -115,7 +115,7 @@ Json deformation_pictures(const std::vector<FiguredRun>& runs) {
   return json;
 }
 
-/// What is imposed and the response over time, each run a curve.
+/// Imposed value and response over time, each run a curve.
 Figure response_figure(const std::vector<FiguredRun>& runs) {
   return {"response",
           runs.front().scene->tissue.title,

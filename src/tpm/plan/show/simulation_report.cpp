@@ -73,8 +73,8 @@ Json energy_json(const SimulationRun& run) {
           {"dissipated_J", nine_digits(e.dissipated_J)}};
 }
 
-/// What spheres with mass have besides: impacts, forces that a load does not name, and what the
-/// stiffness of contacts changes.
+/// Results of spheres with mass besides: impacts, forces that a load does not name, and the effect
+/// of the stiffness of contacts.
 Json motion_json(const ExperimentScene& scene, const SimulationRun& run) {
   const std::vector<ProbeImpact>& impacts = run.record.impacts;
   Json json{{"impacts", {{"count", impacts.size()}}}};
@@ -104,7 +104,7 @@ Json motion_json(const ExperimentScene& scene, const SimulationRun& run) {
   return json;
 }
 
-/// What a contact with a protocol of its own has done.
+/// Motion and force of a contact with a protocol of its own.
 struct OwnCourse {
   bool depth = true;
   double largest = 0.0, last_imposed = 0.0, last = 0.0;
@@ -130,7 +130,7 @@ std::optional<OwnCourse> own_course(const ExperimentScene& scene, const Simulati
   return course;
 }
 
-/// What the contacts are, and the state of the tools among them at the last output.
+/// The contacts, and the state of the tools among them at the last output.
 Json contacts_json(const ExperimentScene& scene, const RunNetwork& network,
                    const SimulationRun& run) {
   const QuasiStaticState& last = run.record.outputs.back();
@@ -314,7 +314,7 @@ std::string equations_text(const ExperimentScene& scene, const SimulationRun& ru
       shortest(f.damping_ratio), significant(run.lowest_frequency_Hz, 4), shortest(f.tolerance));
 }
 
-/// How linear systems were solved.
+/// Solver of the linear systems.
 Json solver_json(const SolverChoice& solver) {
   Json json{{"kind", solver.direct ? "direct" : "iterative"}};
   if (solver.operations > 0.0) {
@@ -335,7 +335,7 @@ std::string solver_text(const SolverChoice& solver) {
   return text + "\n";
 }
 
-/// What is done to which sphere, and the loads of the scene.
+/// The driven spheres and their protocols, and the loads of the scene.
 std::string scene_text(const ExperimentScene& scene) {
   std::string text = fmt::format("{}: sphere {} of {} is {}\n", scene.tissue.title,
                                  scene.probe().sphere + 1, scene.tissue.network.organ.size(),

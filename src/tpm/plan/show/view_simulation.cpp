@@ -20,7 +20,7 @@ std::string step_name(std::size_t step, const char* what) {
   return fmt::format("/steps/{:05}/{}", step, what);
 }
 
-/// What all points of an array must agree on: nothing of the file is trusted.
+/// Reads an array in which all points must agree on their size: nothing of the file is trusted.
 std::vector<double> table_of(const Hdf5Reader& file, const std::filesystem::path& path,
                              const std::string& name, std::size_t numbers) {
   std::vector<double> values = file.table(name);
@@ -166,7 +166,7 @@ void add_curves(const Hdf5Reader& file, ViewPage& page) {
   add_plot(page, time, file, "/curve/dissipated_J", "dissipated energy", "mJ", kMilli);
 }
 
-/// What a planned model is claimed to be accurate to, and what a reader must know of it.
+/// Claimed accuracy of a planned model, and its limits.
 void add_claim(const Hdf5Reader& file, ViewPage& page) {
   if (!file.has("/claim")) return;
   const auto share = [&](const char* name) {
