@@ -487,6 +487,7 @@ FitResult fit_and_judge(const FitProblem& problem) {
   FitResult fit = run_fit(problem.config, data);
   give_both_drift_answers(fit, data);
   if (problem.data.empty()) doubt_history(fit);
+  doubt_pulled_history(fit);
   state_adequacy(fit, data);
   state_scatter(fit);
   repeat_choice(fit);
