@@ -136,6 +136,51 @@ TEST_CASE("a spike in a course is taken away, corners and steps stay", "[before_
   for (std::size_t i = 0; i < clean.size(); ++i) CHECK(std::abs(clean[i] - course[i]) < 1.0);
 }
 
+TEST_CASE("a spike within a ramp is left out, and one of two readings is named", "[before_load]") {
+  constexpr std::size_t kInRamp = 58;  // at 2.9 s, of a ramp from 2 s to 4 s
+  for (const double spike_N : {0.1, -0.1, 5.0}) {
+    Recording one = approached(approach_and_ramp, 30.0, 21);
+    one.response[kInRamp] += spike_N;
+    const Selection s = selected_before_load(std::move(one));
+    const FitResult& fit = chosen_of(s);
+    CAPTURE(spike_N);
+    REQUIRE(fit.adequacy);
+    CHECK(fit.adequacy->is_adequate());
+    CHECK(std::ranges::count(fit.recordings.at(0).outlier, true) == 1);
+    CHECK(std::abs(fit.parameters.front().estimate - 60.0) < 0.3);
+  }
+  Recording two = approached(approach_and_ramp, 30.0, 21);
+  two.response[kInRamp] += 0.2;
+  two.response[kInRamp + 1] += 0.2;
+  const Selection s = selected_before_load(std::move(two));
+  const FitResult& fit = chosen_of(s);
+  REQUIRE(fit.adequacy);
+  REQUIRE(fit.adequacy->is_rejected());
+  REQUIRE(fit.adequacy->causes.size() == 1);
+  CHECK(fit.adequacy->causes.front().code == "spike");
+  CHECK_THAT(fit.adequacy->causes.front().text, Contains("a spike at 2.9 s: two readings"));
+}
+
+TEST_CASE("residuals that step, turn or ring are no spike", "[before_load]") {
+  const auto code_of = [](const std::function<double(int)>& misfit) {
+    NoisyRest made(22);
+    for (std::size_t i = 0; i < made.residual.size(); ++i) {
+      made.residual[i] += misfit(static_cast<int>(i));
+    }
+    const Adequacy a = judge_adequacy(made.data());
+    REQUIRE(a.described == Described::not_described);
+    return a.causes.empty() ? std::string() : a.causes.front().code;
+  };
+  CHECK(code_of([](int i) { return i == 100 ? 300.0 : 0.0; }) == "spike");
+  CHECK(code_of([](int i) { return i == 100 || i == 101 ? -300.0 : 0.0; }) == "spike");
+  CHECK(code_of([](int i) { return i >= 100 ? 300.0 : 0.0; }) != "spike");
+  CHECK(code_of([](int i) { return std::max(0, 60 - std::abs(i - 100)) * 5.0; }) != "spike");
+  CHECK(code_of([](int i) { return 300.0 * std::sin(0.4 * i) * std::exp(-i / 40.0); }) != "spike");
+  // Beside a larger misfit it is not what makes the law wrong.
+  CHECK(code_of([](int i) { return 100.0 * std::sin(0.05 * i) + (i == 100 ? 300.0 : 0.0); }) !=
+        "spike");
+}
+
 TEST_CASE("where an approach through the air begins is no noise of the depth", "[before_load]") {
   const Selection s = selected_before_load(approached(approach_and_ramp, 30.0, 3));
   const FitResult& fit = chosen_of(s);

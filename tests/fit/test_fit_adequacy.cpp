@@ -234,6 +234,38 @@ TEST_CASE("without a rest adequacy cannot be judged", "[adequacy][wired]") {
   CHECK_THAT(adequacy.summary, StartsWith("adequacy cannot be judged"));
 }
 
+TEST_CASE("where neither a rest nor the residuals tell the noise nothing is identified",
+          "[adequacy][wired]") {
+  AdequacyTrial trial;
+  trial.at_rest = 4;
+  trial.defect = Defect::slow_branch;
+  trial.defect_N = 0.1;
+  const PreparedRecording wrong = prepared_trial(trial);
+  const Selection s = selected_law("linear-1", wrong, true);
+  const FitResult& fit = best_of(s);
+  REQUIRE(fit.noise);
+  REQUIRE(fit.value_count / fit.noise->inflation < static_cast<double>(fit.parameters.size()));
+  CHECK_FALSE(s.candidates[s.recommended].identified);
+  for (const ParameterResult& p : fit.parameters) {
+    CAPTURE(p.parameter.name);
+    CHECK_THAT(verdict_text(p), !StartsWith("identified"));
+  }
+  // The written configuration says the same when it is run.
+  const FitResult again =
+      fit_and_judge({parse_fit_config(config_json(fit.config), "test"), {wrong.recording}});
+  for (const ParameterResult& p : again.parameters) CHECK_THAT(verdict_text(p), !StartsWith("id"));
+  // A law that is right leaves noise that tells itself.
+  trial.defect = Defect::none;
+  for (const double rho : {0.0, 0.9}) {
+    trial.rho = rho;
+    const Selection right = selected_law("linear-1", prepared_trial(trial), true);
+    CAPTURE(rho);
+    CHECK(best_of(right).adequacy.value().verdict == "not_judged");
+    CHECK(std::ranges::none_of(best_of(right).parameters,
+                               [](const ParameterResult& p) { return p.unconfirmed.has_value(); }));
+  }
+}
+
 TEST_CASE("readings at the limit of a force cell are named and censored", "[adequacy][clipping]") {
   AdequacyTrial trial;
   trial.at_rest = 40;

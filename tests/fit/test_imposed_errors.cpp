@@ -63,6 +63,40 @@ TEST_CASE("noise of the drive does not move the plateau out of its interval", "[
   }
 }
 
+TEST_CASE("a depth recorded in coarse steps leaves the law described, its intervals near and right",
+          "[rounded_drive][adequacy]") {
+  constexpr double kStep_m = 1e-4;
+  int closed = 0, missing = 0;
+  for (const double step_s : {0.02, 0.05}) {
+    for (const double depth_m : {3.7e-3, 4e-3}) {
+      test::PlacedTest placed;
+      placed.step_s = step_s;
+      placed.depth_m = depth_m;
+      Random random(11);
+      Recording r = test::measured(placed, test::placed(placed), random);
+      for (double& depth : r.drive) depth = std::round(depth / kStep_m) * kStep_m;
+      const PreparedRecording recording = prepare_recording("made.csv", std::move(r));
+      const Selection s = selected_of(recording, "linear-1", true);
+      const FitResult& fit = s.candidates[s.recommended].fit;
+      CAPTURE(step_s, depth_m);
+      // A ramp of 40 readings does not tell its own scatter.
+      if (step_s < 0.03) CHECK(fit.adequacy.value().is_adequate());
+      // Their sawtooth alternates: it is no noise that lasts for the whole hold.
+      CHECK((!fit.noise || fit.noise->phi < 0.9));
+      for (const auto& [name, truth] : {std::pair("k1", 45.0), {"tau1", 2.0}}) {
+        CAPTURE(name);
+        const ParameterResult& p = parameter_of(fit, name);
+        if (!p.lower || !p.upper) continue;
+        ++closed;
+        missing += truth < *p.lower || truth > *p.upper;
+        CHECK(*p.upper - *p.lower < 0.1 * truth);
+      }
+    }
+  }
+  CHECK(closed == 8);
+  CHECK(missing == 0);
+}
+
 TEST_CASE("a contact that only a power with an exponent of no probe tells is not identified",
           "[doubtful_contact]") {
   // A ball of 3 mm on a layer of 2 mm stiffens more than a power does (Dimitriadis 2002).

@@ -12,6 +12,7 @@
 #include "tpm/files/import/recording_file.hpp"
 #include "tpm/fit/select/fit_adequacy.hpp"
 #include "tpm/fit/select/selection.hpp"
+#include "tpm/fit/verdict.hpp"
 #include "tpmkit/law_model.hpp"
 
 using namespace tpm;
@@ -39,6 +40,32 @@ Recording conditioned(bool held, double tau_s = 0.7) {
           .value;
   Random random(7);
   for (const double force : f) r.response.push_back(std::max(0.0, force) + 3e-4 * random.normal());
+  return r;
+}
+
+struct CycledTrial {
+  bool glued = false;   ///< the force pulls on withdrawal; else contact is lost
+  double rest_s = 5.0;  ///< between the cycles and the ramp that is held
+};
+
+/// The same cycles: 100 N/m, 40 N/m, 0.7 s.
+Recording cycled(const CycledTrial& trial) {
+  constexpr double kStep_s = 0.05, kTau_s = 0.7;
+  const auto cycle = [](double t) { return std::max(0.0, 4e-3 * (1.0 - std::abs(t - 1.0))); };
+  Recording r;
+  Random random(7);
+  double branch = 0.0, before = 0.0;
+  for (int i = 0; kStep_s * i < 25.0 + trial.rest_s; ++i) {
+    const double t = kStep_s * i, ramp = 4e-3 * (t - 5.0 - trial.rest_s);
+    const double depth = cycle(t - 1.0) + cycle(t - 3.0) + std::clamp(ramp, 0.0, 4e-3);
+    const double left = std::exp(-kStep_s / kTau_s);
+    branch = branch * left + 40.0 * (depth - before) * kTau_s / kStep_s * (1.0 - left);
+    before = depth;
+    const double force = 100.0 * depth + branch;
+    r.time_s.push_back(t);
+    r.drive.push_back(depth);
+    r.response.push_back((trial.glued ? force : std::max(0.0, force)) + 3e-4 * random.normal());
+  }
   return r;
 }
 
@@ -136,6 +163,30 @@ TEST_CASE(
   CHECK_FALSE(right.unconfirmed);
   REQUIRE((right.lower && right.upper));
   CHECK((*right.lower < 40.0 && 40.0 < *right.upper));
+}
+
+TEST_CASE("A specimen that pulls in the history before the fitted part leaves nothing identified") {
+  for (const bool glued : {false, true}) {
+    for (const double rest_s : {1.5, 12.0}) {
+      const PreparedRecording recording =
+          prepare_recording("cycles.csv", cycled({.glued = glued, .rest_s = rest_s}));
+      FitConfig config = recording_config(parse_law_name("linear-1", "test"),
+                                          std::span(&recording, 1), SetupOptions{});
+      config.data.front().from_s = 5.0 + rest_s - 0.5;  // in the rest behind the cycles
+      config.data.front().to_s = recording.recording.time_s.back();
+      const FitResult fit = fit_and_judge({config, {recording.recording}});
+      CAPTURE(glued, rest_s);
+      // What pulled 5 relaxation times before is forgotten.
+      const bool doubted = glued && rest_s < 2.0;
+      CHECK(test::has_remark(fit.remarks, "pulled_history") == doubted);
+      for (const char* name : {"k1", "tau1"}) {
+        CAPTURE(name);
+        const ParameterResult& p = find(fit, name);
+        CHECK(p.unconfirmed.has_value() == doubted);
+        if (doubted) CHECK_THAT(verdict_text(p), Contains("the specimen pulls"));
+      }
+    }
+  }
 }
 
 TEST_CASE("Cycles without a hold are told as such") {

@@ -273,6 +273,54 @@ std::optional<EqualRun> frozen_run(const AdequacyData& data, const RestNoise& no
   return run;
 }
 
+/// One reading or two in a row on one side that leave their neighbours and return.
+struct Spike {
+  std::size_t first = 0, length = 0;
+  double size = 0.0;  ///< off the line between the readings beside
+};
+
+/// Values first, first + 1, ... that are all off the line between those beside them by more than 8
+/// robust standard deviations on one side, while those are near their own neighbours.
+std::optional<Spike> spike_at(std::span<const double> values, std::size_t first, std::size_t length,
+                              double far) {
+  constexpr double kNear = 0.25;  // of the spike
+  const double before = values[first - 1], after = values[first + length];
+  double least = HUGE_VAL, most = -HUGE_VAL;
+  for (std::size_t k = 0; k < length; ++k) {
+    const double share = static_cast<double>(k + 1) / static_cast<double>(length + 1);
+    const double off = values[first + k] - before - share * (after - before);
+    least = std::min(least, off);
+    most = std::max(most, off);
+  }
+  const double size = least > 0.0 ? least : most < 0.0 ? -most : 0.0;
+  const double near = kNear * size;
+  const bool alone = std::abs(before - values[first - 2]) < near &&
+                     std::abs(after - values[first + length + 1]) < near &&
+                     std::abs(after - before) < near;
+  if (size <= far || !alone) return std::nullopt;
+  return Spike{first, length, std::max(most, -least)};
+}
+
+/// A spike that holds most of the squares of the residuals.
+std::optional<Spike> spike_in(std::span<const double> residual) {
+  constexpr std::size_t kFewest = 20, kLongest = 2;
+  constexpr double kFar = 8.0, kOfMedian = 1.4826, kMost = 0.5;
+  if (residual.size() < kFewest) return std::nullopt;
+  std::vector<double> off;
+  for (std::size_t i = 1; i + 1 < residual.size(); ++i) {
+    off.push_back(std::abs(residual[i] - 0.5 * (residual[i - 1] + residual[i + 1])));
+  }
+  const double far = kFar * kOfMedian * median(std::move(off));
+  const double all = squares_about(residual, 0.0);
+  for (std::size_t length = 1; far > 0.0 && length <= kLongest; ++length) {
+    for (std::size_t i = 2; i + length + 1 < residual.size(); ++i) {
+      const auto spike = spike_at(residual, i, length, far);
+      if (spike && squares_about(residual.subspan(i, length), 0.0) > kMost * all) return spike;
+    }
+  }
+  return std::nullopt;
+}
+
 std::vector<Remark> causes_of(const AdequacyData& data, const RestNoise& noise, double level) {
   std::vector<Remark> causes;
   const double sd = std::sqrt(noise.variance);
@@ -311,6 +359,13 @@ std::vector<Remark> causes_of(const AdequacyData& data, const RestNoise& noise, 
                        "fitted part lasts",
                        times_text(moved / sd))});
     }
+  }
+  if (const auto spike = spike_in(data.residual); spike && causes.empty()) {
+    causes.push_back(
+        {"spike", fmt::format("a spike at {} s: {} {} times the noise off the readings beside",
+                              significant(data.time_s[spike->first], 4),
+                              spike->length == 1 ? "one reading is" : "two readings are up to",
+                              times_text(spike->size / sd))});
   }
   const std::size_t early = std::max<std::size_t>(data.residual.size() / 10, 5);
   if (causes.empty() && data.residual.size() > 3 * early &&

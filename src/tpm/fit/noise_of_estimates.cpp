@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <Eigen/Cholesky>
+#include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <cmath>
 
@@ -250,6 +251,44 @@ class Estimates {
   Eigen::MatrixXd scaled_, bread_, from_priors_;
 };
 
+/// True if generalised least squares at the estimated phi leads away from the estimates of ordinary
+/// least squares by more than noise with that phi explains (Hausman, Econometrica 46 (1978) 1251).
+/// Then what the law does not meet follows its own derivatives from sample to sample, as the steps
+/// of a drive that was recorded in a coarse resolution do, and the phi is none of the noise.
+bool is_contradicted(const AutoregressionEstimate& found, const std::vector<double>& time_s,
+                     const Eigen::VectorXd& residual, const Eigen::MatrixXd& jacobian,
+                     double step_s) {
+  constexpr double kSure = 1e-3, kNothing = 1e-6;
+  if (!(found.phi > 0.0 && found.variance > 0.0)) return false;
+  const AutoregressiveNoise noise(found.phi, step_s);
+  const Eigen::VectorXd length = jacobian.colwise().norm().transpose();
+  if (!(length.minCoeff() > 0.0)) return false;
+  const Eigen::MatrixXd j = jacobian * length.cwiseInverse().asDiagonal();
+  Eigen::MatrixXd white_j = j;
+  Eigen::VectorXd white_r = residual;
+  noise.whiten(time_s, white_j);
+  noise.whiten(time_s, white_r);
+  const Eigen::LLT<Eigen::MatrixXd> gram(white_j.transpose() * white_j);
+  const Eigen::LLT<Eigen::MatrixXd> plain(j.transpose() * j);
+  if (gram.info() != Eigen::Success || plain.info() != Eigen::Success) return false;
+  const Eigen::MatrixXd spread = j.transpose() * correlated_columns(noise, time_s, j);
+  const Eigen::MatrixXd bread = plain.solve(Eigen::MatrixXd::Identity(j.cols(), j.cols()));
+  const Eigen::MatrixXd root = gram.matrixU();
+  // Both covariances in units of the one of generalised least squares.
+  const Eigen::MatrixXd more = root * (bread * spread * bread) * root.transpose() -
+                               Eigen::MatrixXd::Identity(j.cols(), j.cols());
+  const Eigen::VectorXd away =
+      root * gram.solve(white_j.transpose() * white_r) / std::sqrt(found.variance);
+  const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> axes(0.5 * (more + more.transpose()));
+  double statistic = 0.0, degrees = 0.0;
+  for (Eigen::Index k = 0; k < j.cols(); ++k) {
+    if (!(axes.eigenvalues()[k] > kNothing)) continue;
+    statistic += std::pow(axes.eigenvectors().col(k).dot(away), 2) / axes.eigenvalues()[k];
+    degrees += 1.0;
+  }
+  return degrees > 0.0 && chi_squared_tail(statistic, degrees) < kSure;
+}
+
 /// The autoregression of the residuals. Priors count as readings of the same size, which their
 /// weight makes of them.
 AutoregressionEstimate autoregression_of(const NoiseRows& rows, bool scale_known) {
@@ -269,6 +308,11 @@ AutoregressionEstimate autoregression_of(const NoiseRows& rows, bool scale_known
       if (residual.size() <= kLong) jacobian.row(row) = rows.jacobian.row(row) * share;
     }
     estimate = estimate_autoregression(rows.time_s, residual, jacobian, rows.step_s);
+    if (residual.size() <= kLong &&
+        is_contradicted(estimate, rows.time_s, residual, jacobian, rows.step_s)) {
+      estimate = estimate_autoregression(rows.time_s, residual,
+                                         Eigen::VectorXd::Ones(residual.size()), rows.step_s);
+    }
     variance = estimate.variance;
   }
   return estimate;

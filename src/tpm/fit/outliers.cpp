@@ -7,6 +7,7 @@
 
 #include "tpm/base/text.hpp"
 #include "tpm/fit/likelihood/quantum.hpp"
+#include "tpm/fit/spikes_at_rest.hpp"
 
 namespace tpm::fit {
 namespace {
@@ -25,7 +26,7 @@ bool may_have_outliers(const FitConfig& config) {
 /// Readings of one recording and their distances from the curve.
 struct CurveDistance {
   std::vector<std::size_t> data;
-  std::vector<double> reading, sigma, distance;
+  std::vector<double> time_s, reading, sigma, distance;
 };
 
 /// 0 if there is no noise to compare with.
@@ -42,6 +43,18 @@ double robust_deviation(const CurveDistance& d) {
   return std::max(own, rounding / *std::ranges::min_element(d.sigma));
 }
 
+/// Distances that leave those of their neighbours and return. A large spike where readings are few
+/// bends the curve, and the readings beside it are then not near the curve either.
+std::vector<bool> lone_spikes(const CurveDistance& d) {
+  const std::vector<double> clean = without_spikes(d.time_s, d.distance);
+  std::vector<bool> spikes(clean.size(), false);
+  const auto differs = [&](std::size_t i) { return clean[i] != d.distance[i]; };
+  for (std::size_t i = 1; i + 1 < clean.size(); ++i) {
+    spikes[i] = differs(i) && !differs(i - 1) && !differs(i + 1);
+  }
+  return spikes;
+}
+
 std::vector<std::size_t> outliers_of(const CurveDistance& d) {
   constexpr std::size_t kFewest = 20;
   if (d.data.size() < kFewest) return {};
@@ -50,7 +63,10 @@ std::vector<std::size_t> outliers_of(const CurveDistance& d) {
   const auto beyond = [&](std::size_t i, double times) {
     return std::abs(d.distance[i]) > times * sd;
   };
-  std::vector<std::size_t> found;
+  std::vector<bool> lies_off = lone_spikes(d);
+  for (std::size_t i = 0; i < lies_off.size(); ++i) {
+    lies_off[i] = lies_off[i] && beyond(i, kFarFromCurve);
+  }
   for (std::size_t i = 0; i < d.data.size(); ++i) {
     if (!beyond(i, kFarFromCurve)) continue;
     std::size_t end = i;
@@ -63,8 +79,12 @@ std::vector<std::size_t> outliers_of(const CurveDistance& d) {
     const bool scattered = end - i == 1 || (end - i <= kMostTogether && !one_sign);
     const bool alone = scattered && (i == 0 || !beyond(i - 1, kNearCurve)) &&
                        (end == d.data.size() || !beyond(end, kNearCurve));
-    for (std::size_t k = i; k < end && alone; ++k) found.push_back(d.data[k]);
+    for (std::size_t k = i; k < end && alone; ++k) lies_off[k] = true;
     i = end;
+  }
+  std::vector<std::size_t> found;
+  for (std::size_t i = 0; i < lies_off.size(); ++i) {
+    if (lies_off[i]) found.push_back(d.data[i]);
   }
   const bool few = 20 * found.size() <= d.data.size();
   return few ? found : std::vector<std::size_t>();
@@ -84,6 +104,7 @@ std::vector<std::size_t> isolated_outliers(const ExperimentResiduals& function,
       const FitDatum& d = function.data()[i];
       if ((d.held_out && !d.outlier) || !d.value) continue;
       distances.data.push_back(i);
+      distances.time_s.push_back(d.time_s);
       distances.reading.push_back(*d.value);
       distances.sigma.push_back(d.sigma);
       distances.distance.push_back(

@@ -22,6 +22,7 @@
 #include "tpm/fit/select/law_choice.hpp"
 #include "tpm/fit/select/reading_scatter.hpp"
 #include "tpm/fit/select/unloading_test.hpp"
+#include "tpm/fit/select/untold_noise.hpp"
 #include "tpm/fit/spikes_at_rest.hpp"
 #include "tpm/fit/verdict.hpp"
 
@@ -72,17 +73,14 @@ Adequacy adequacy_of(const RecordingFit& fit, const RestedRecording& rested, int
                      double level) {
   const Recording& r = *rested.recording;
   const std::size_t end = std::min(rested.at_rest, r.time_s.size());
-  std::vector<double> rest_time;
-  std::vector<double> rest;
+  std::vector<double> rest_time, rest;
   const std::vector<bool> spikes = spikes_at_rest(std::span(r.response).first(end));
   for (std::size_t i = 0; i < end; ++i) {
     if (spikes[i]) continue;
     rest_time.push_back(r.time_s[i]);
     rest.push_back(r.response[i]);
   }
-  std::vector<double> time;
-  std::vector<double> reading;
-  std::vector<double> residual;
+  std::vector<double> time, reading, residual;
   for (std::size_t i = 0; i < fit.time_s.size(); ++i) {
     if (!fit.fitted[i] || !std::isfinite(fit.predicted[i])) continue;
     time.push_back(fit.time_s[i]);
@@ -479,7 +477,9 @@ void state_adequacy(FitResult& fit, const std::vector<DataSet>& data) {
     }
     judged = worst_of(fit, rests);
   }
-  if (judged) state(fit, stated(fit, *judged, 1, {}));
+  if (!judged) return;
+  state(fit, stated(fit, *judged, 1, {}));
+  doubt_untold_noise(fit);
 }
 
 FitResult fit_and_judge(const FitProblem& problem) {
@@ -487,6 +487,7 @@ FitResult fit_and_judge(const FitProblem& problem) {
   FitResult fit = run_fit(problem.config, data);
   give_both_drift_answers(fit, data);
   if (problem.data.empty()) doubt_history(fit);
+  doubt_pulled_history(fit);
   state_adequacy(fit, data);
   state_scatter(fit);
   repeat_choice(fit);

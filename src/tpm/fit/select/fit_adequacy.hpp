@@ -36,7 +36,7 @@ void state_adequacy(FitResult& fit, std::span<const PreparedRecording> recording
 
 /// The same for a fit whose configuration states the size of the noise, which is then what the
 /// residuals are compared with; for recordings without, by their samples at rest. Says nothing of
-/// separate readings whose noise is not known.
+/// separate readings whose noise is not known. Without a verdict see doubt_untold_noise().
 /// @param data what was fitted, one for each of the configuration's data sets
 void state_adequacy(FitResult& fit, const std::vector<DataSet>& data);
 

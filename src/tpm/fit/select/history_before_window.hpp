@@ -14,4 +14,12 @@ namespace tpm::fit {
 /// @return true if a parameter lost its verdict
 bool doubt_history(FitResult& fit);
 
+/// Whether the history before the fitted part of an indentation is one that the law has: it loses
+/// contact where a load would have to pull. Where at least 3 readings in a row before the fitted
+/// part, after a load, lie below the force without contact by more than 5 residuals and 1 % of the
+/// peak (a specimen that is glued, gripped or sticks), and less than 5 times the longest relaxation
+/// time passed since, no parameter of the material is identified, and a remark says so.
+/// @return true if such a history was found
+bool doubt_pulled_history(FitResult& fit);
+
 }  // namespace tpm::fit

@@ -7,7 +7,9 @@
 #include <limits>
 #include <map>
 #include <string>
+#include <vector>
 
+#include "tpm/base/median.hpp"
 #include "tpm/fit/select/reading_scatter.hpp"
 #include "tpm/fit/verdict.hpp"
 
@@ -69,6 +71,19 @@ std::optional<FloorOfReadings> find_floor(const Recording& step, const FitResult
   floor.last_s = step.time_s[static_cast<std::size_t>(first) - 1];
   floor.behind = step.response.size() - static_cast<std::size_t>(first);
   return floor;
+}
+
+std::optional<double> floor_as_scatter(const FitResult& fit, const FloorOfReadings& floor) {
+  constexpr double kOfMedian = 1.4826;
+  if (fit.config.data.front().noise.kind != NoiseKind::relative_to_datum) return std::nullopt;
+  std::vector<double> shares;
+  for (const FittedDatum& d : fit.data) {
+    if (d.datum.held_out || !d.datum.value || !(*d.datum.value > 0.0)) continue;
+    shares.push_back(std::abs(d.predicted / *d.datum.value - 1.0));
+  }
+  if (shares.empty()) return std::nullopt;
+  const double share = kOfMedian * base::median(std::move(shares));
+  return share > 0.0 ? std::optional(floor.value / share) : std::nullopt;
 }
 
 bool doubt_small_plateau(FitResult& fit, bool times_stated) {

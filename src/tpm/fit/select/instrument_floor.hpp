@@ -20,6 +20,14 @@ struct FloorOfReadings {
 [[nodiscard]] std::optional<FloorOfReadings> find_floor(const Recording& step,
                                                         const FitResult& fit);
 
+/// Noise a + b |reading| of an instrument whose readings stand at a floor above 0: a is the floor,
+/// b the robust share of the residuals. Below a floor an instrument does not trust its readings,
+/// and the few that lie little above it would else count as if they were as good as the large ones.
+/// @param fit without the readings at the floor
+/// @return a / b, SI; none if the noise is not taken to be a share of a reading
+[[nodiscard]] std::optional<double> floor_as_scatter(const FitResult& fit,
+                                                     const FloorOfReadings& floor);
+
 /// Doubts the lasting stiffness of a material function (ParameterResult::not_separable) whose
 /// readings are all above 0, where
 /// - it is below 3 times the scatter that a reading of 0 may have (most_scatter_of_small): an

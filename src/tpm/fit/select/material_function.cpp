@@ -408,6 +408,10 @@ Selection select_law(const MaterialFunction& function, const SelectionOptions& o
     s = ranked_laws(function, options, limits);
   }
   limits.scatter = scatter_floor(s.candidates[s.best_bic].fit);
+  const bool scattered = limits.scatter.has_value();
+  if (!scattered && standing) {
+    limits.scatter = floor_as_scatter(s.candidates[s.best_bic].fit, *standing);
+  }
   const std::optional<double>& floor = limits.scatter;
   if (floor) s = ranked_laws(function, options, limits);
   const auto with_profiles = [&](const LawSpec& law) {
@@ -441,7 +445,11 @@ Selection select_law(const MaterialFunction& function, const SelectionOptions& o
                      standing->count, with_unit(significant(standing->value / unit.to_si, 4), unit),
                      standing->behind, significant(standing->last_s, 4))});
   }
-  if (floor) {
+  if (floor && !scattered) {
+    s.remarks.push_back({"scatter_near_floor",
+                         "readings little above the least are taken to scatter by as much as that, "
+                         "beside their share"});
+  } else if (floor) {
     const Unit unit = shown_unit(quantity_dimension(chosen.fit.data.front().datum.quantity));
     const bool alike = *floor > sizes_of_function(function).largest;
     s.remarks.push_back(

@@ -17,6 +17,7 @@
 #include "tpm/fit/select/gate.hpp"
 #include "tpm/fit/select/law_choice.hpp"
 #include "tpm/fit/select/recording_setup.hpp"
+#include "tpm/fit/select/untold_noise.hpp"
 #include "tpm/work/give_up.hpp"
 #include "tpm/work/progress.hpp"
 #include "tpmkit/error.hpp"
@@ -422,6 +423,10 @@ Selection select_law(std::span<const PreparedRecording> recordings,
   warn(protocol_remarks(chosen.fit, recordings));
   warn(outside_remarks(chosen.fit));
   state_adequacy(s, recordings);
+  if (doubt_untold_noise(chosen.fit)) {
+    chosen.identified = false;
+    chosen.reason = "the noise is not told";
+  }
   name_channel_cause(s, recordings, options.setup);
   describe(s);
   for (const PreparedRecording& r : recordings) {
