@@ -365,6 +365,20 @@ TEST_CASE("rows of one time stamp become their mean, and it is said") {
                         Catch::Contains("a file for each part before and after this line"));
 }
 
+TEST_CASE("rows that are not in the order of time are told from a clock that restarts") {
+  const TempFolder folder;
+  const std::string head = "Time (s),Force (N),Depth (mm)\n";
+  write_file(folder / "f.csv", head + "5,5,5\n4,4,4\n3,3,3\n2,2,2\n1,1,1\n0,0,0\n");
+  CHECK_THROWS_WITH(read_recording_file(folder / "f.csv", {}),
+                    Catch::Contains("f.csv:3: time 4 s does not follow 5 s: the newest row comes "
+                                    "first, from 5 s down to 0 s") &&
+                        Catch::Contains("the rows sorted by their time"));
+  write_file(folder / "g.csv",
+             head + "0,0,0\n5,1,1\n1,2,2\n6,3,3\n2,4,4\n7,5,5\n3,6,6\n8,7,7\n4,8,8\n");
+  CHECK_THROWS_WITH(read_recording_file(folder / "g.csv", {}),
+                    Catch::Contains("the rows are not in the order of time, which goes back 4"));
+}
+
 TEST_CASE("WebPlotDigitizer CSV: one dataset, and several") {
   CHECK_THROWS_WITH(
       import_curves(fixture("wpd_single.csv"), {}),

@@ -321,6 +321,38 @@ std::optional<Spike> spike_in(std::span<const double> residual) {
   return std::nullopt;
 }
 
+/// A reading that is far from the one before it, and the next ones stay there, where the drive has
+/// come to rest: as when a specimen slips, or a force cell is tared under a load.
+struct Jump {
+  double at_s = 0.0;
+  double by = 0.0;
+};
+
+std::optional<Jump> jump_under_load(const AdequacyData& data, const RestNoise& noise) {
+  constexpr std::size_t kAround = 5;            // samples on each side
+  constexpr double kFar = 20.0;                 // standard deviations of the noise
+  constexpr double kAlone = 4.0, kStays = 0.5;  // times the steps around it; of the jump
+  const std::span<const double> residual = data.residual;
+  const auto hold = static_cast<std::size_t>(std::ranges::upper_bound(data.time_s, data.ramp_to_s) -
+                                             data.time_s.begin());
+  std::optional<Jump> largest;
+  for (std::size_t i = hold + 2 * kAround; i + kAround < residual.size(); ++i) {
+    const double step = residual[i] - residual[i - 1];
+    if (std::abs(step) <= kFar * std::sqrt(noise.variance)) continue;
+    if (largest && std::abs(step) <= std::abs(largest->by)) continue;
+    double around = 0.0;
+    for (std::size_t k = 1; k < kAround; ++k) {
+      around = std::max({around, std::abs(residual[i + k] - residual[i + k - 1]),
+                         std::abs(residual[i - k] - residual[i - k - 1])});
+    }
+    const double stays =
+        (mean_of(residual.subspan(i, kAround)) - mean_of(residual.subspan(i - kAround, kAround))) /
+        step;
+    if (std::abs(step) > kAlone * around && stays > kStays) largest = Jump{data.time_s[i], step};
+  }
+  return largest;
+}
+
 std::vector<Remark> causes_of(const AdequacyData& data, const RestNoise& noise, double level) {
   std::vector<Remark> causes;
   const double sd = std::sqrt(noise.variance);
@@ -333,12 +365,13 @@ std::vector<Remark> causes_of(const AdequacyData& data, const RestNoise& noise, 
                      run->largest ? "largest" : "smallest")});
   }
   if (const auto lost = signal_lost(data, noise)) {
+    const bool moves_on = lost->at_s < data.ramp_to_s;
     causes.push_back(
         {lost->to_the_end ? "signal_ends" : "signal_lost",
          fmt::format("{}: from {} s on readings are {} at the level of the rest{}",
-                     lost->to_the_end
-                         ? "lost signal, or a fluid whose response ends with the motion"
-                         : "lost signal",
+                     !lost->to_the_end ? "lost signal"
+                     : moves_on        ? "lost signal, or a specimen that broke or slipped out"
+                                : "lost signal, or a fluid whose response ends with the motion",
                      significant(lost->at_s, 4), lost->to_the_end ? "to the end" : "back",
                      lost->to_the_end ? "" : " under a load")});
   }
@@ -348,6 +381,12 @@ std::vector<Remark> causes_of(const AdequacyData& data, const RestNoise& noise, 
          fmt::format("frozen signal: {} readings in a row from {} s on are equal, longer than "
                      "rounding makes",
                      run->length, significant(data.time_s[run->first], 4))});
+  }
+  if (const auto jump = jump_under_load(data, noise); jump && causes.empty()) {
+    causes.push_back(
+        {"jump", fmt::format("a slip, or a zero that was set under a load: at {} s readings change "
+                             "by {} noises from one to the next",
+                             significant(jump->at_s, 4), fixed(std::abs(jump->by) / sd, 0))});
   }
   if (const auto trend = rest_trend(data.rest_time_s, data.rest)) {
     constexpr double kSeen = 4.0, kMatters = 1.0;
@@ -373,7 +412,8 @@ std::vector<Remark> causes_of(const AdequacyData& data, const RestNoise& noise, 
     // Without its ramp any kernel describes a hold.
     constexpr std::ptrdiff_t kShape = 10;  // samples that show the shape of a ramp
     const auto ramp = std::ranges::upper_bound(data.time_s, data.ramp_to_s) - data.time_s.begin();
-    const bool has_ramp = ramp >= kShape && ramp <= static_cast<std::ptrdiff_t>(early);
+    // Too little of it is left to show its shape.
+    const bool has_ramp = ramp >= kShape && ramp < static_cast<std::ptrdiff_t>(early) + kShape;
     causes.push_back({has_ramp ? "ramp_or_transient" : "transient",
                       fmt::format("{}: without the first {} samples, to {} s, it would",
                                   has_ramp ? "the shape of the ramp, or a transient" : "transient",

@@ -140,6 +140,7 @@ std::string range_words(const ParameterResult& p, double level) {
             p.not_separable->code == kDriftOrBranch     ? "drift"
             : p.not_separable->code == kPlateauOrBranch ? "such a branch"
             : p.not_separable->code == kPlateauOrFloor  ? "such a floor"
+            : p.not_separable->code == kZeroOrContact   ? "such a cut"
                                                         : "such a loading",
             interval);
       }

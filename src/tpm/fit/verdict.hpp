@@ -32,11 +32,13 @@ namespace tpm::fit {
 [[nodiscard]] std::string parameter_words(const ParameterResult& parameter, double level);
 
 /// Codes of ParameterResult::not_separable: no rest tells a drift of the zero; a material function
-/// does not tell its plateau; contact trades off with a loading that no probe's exponent describes.
+/// does not tell its plateau; contact trades off with a loading that no probe's exponent describes;
+/// readings at rest were cut off.
 inline constexpr const char* kDriftOrBranch = "drift_or_slow_branch";
 inline constexpr const char* kPlateauOrBranch = "plateau_or_slower_branch";
 inline constexpr const char* kPlateauOrFloor = "plateau_or_floor";
 inline constexpr const char* kContactOrLoading = "contact_or_loading";
+inline constexpr const char* kZeroOrContact = "zero_or_contact";
 
 /// "eta1 = 5 Pa s is excluded by these data (...)" or "undetermined ...".
 [[nodiscard]] std::string hypothesis_words(const HypothesisResult& result, double level);

@@ -49,6 +49,26 @@ std::string place(const ImportedSeries& series, const std::string& file, std::si
   return series.name.empty() ? file : fmt::format("{}: dataset '{}'", file, printable(series.name));
 }
 
+/// Why times go back at many rows, if they do: a table that was sorted by another column, or whose
+/// newest row comes first. Empty where they go back here and there, as a clock does that restarts.
+std::string order_of_rows(const std::vector<double>& times, const std::string& unit) {
+  constexpr std::size_t kFewest = 4;  // steps that go back
+  constexpr double kMany = 0.1;       // of all steps
+  std::size_t back = 0;
+  bool rises = false;
+  for (std::size_t i = 1; i < times.size(); ++i) {
+    if (times[i] < times[i - 1]) ++back;
+    if (times[i] > times[i - 1]) rises = true;
+  }
+  if (back < kFewest || static_cast<double>(back) < kMany * static_cast<double>(times.size()))
+    return {};
+  if (!rises) {
+    return fmt::format("the newest row comes first, from {} {} down to {} {}",
+                       shortest(times.front()), unit, shortest(times.back()), unit);
+  }
+  return fmt::format("the rows are not in the order of time, which goes back {} times", back);
+}
+
 void require_times(const ImportedSeries& series, const std::string& file) {
   const ImportedColumn* time = find(series, Quantity::time);
   if (time == nullptr) return;
@@ -58,15 +78,22 @@ void require_times(const ImportedSeries& series, const std::string& file) {
                     fmt::format("time {} {}", shortest(time->values[i]), time->unit.symbol),
                     kTimeRange);
   }
+  const std::string order = order_of_rows(time->values, time->unit.symbol);
   for (std::size_t i = 1; i < time->values.size(); ++i) {
     if (time->values[i] > time->values[i - 1]) continue;
-    throw bad_input(
-        place(series, file, i),
+    const std::string step =
         fmt::format("time {} {} does not follow {} {}", shortest(time->values[i]),
-                    time->unit.symbol, shortest(time->values[i - 1]), time->unit.symbol),
-        series.lines.empty() ? "strictly increasing times"
-                             : "strictly increasing times: another --time COLUMN, or a file for "
-                               "each part before and after this line");
+                    time->unit.symbol, shortest(time->values[i - 1]), time->unit.symbol);
+    if (series.lines.empty())
+      throw bad_input(place(series, file, i), step, "strictly increasing times");
+    if (order.empty()) {
+      throw bad_input(place(series, file, i), step,
+                      "strictly increasing times: another --time COLUMN, or a file for each part "
+                      "before and after this line");
+    }
+    throw bad_input(place(series, file, i), fmt::format("{}: {}", step, order),
+                    "strictly increasing times: the rows sorted by their time, or another --time "
+                    "COLUMN");
   }
 }
 

@@ -106,6 +106,36 @@ std::vector<UnseenRise> unseen_rises(const PreparedRecording& r) {
   return rises;
 }
 
+void end_before_unseen_motion(PreparedRecording& r) {
+  constexpr std::size_t kAround = 5;   // intervals on each side
+  constexpr double kMany = 20.0;       // times the longest of them
+  constexpr double kRamp = 0.1;        // of the range of the drive
+  constexpr std::size_t kCorners = 5;  // intervals of a rise
+  const std::vector<double>& time = r.recording.time_s;
+  const std::vector<double>& drive = r.recording.drive;
+  const Motions motions(r);
+  const auto [low, high] = std::ranges::minmax_element(drive);
+  double highest = drive.front();
+  for (std::size_t i = 0; i + kAround + 1 < time.size() && time[i + 1] <= r.to_s; ++i) {
+    highest = std::max(highest, drive[i]);
+    const bool ramped = highest - drive.front() > kRamp * (*high - *low);
+    if (i < kAround || !ramped || !(time[i] > r.from_s) || motions.direction(i) == 0) continue;
+    double longest = 0.0;
+    for (std::size_t k = 1; k <= kAround; ++k) {
+      longest = std::max({longest, time[i + 1 - k] - time[i - k], time[i + 1 + k] - time[i + k]});
+    }
+    if (time[i + 1] - time[i] < kMany * longest) continue;
+    if (motions.intervals_of_ramp(i, i + 1) > kCorners) continue;
+    r.to_s = time[i];
+    r.remarks.push_back(
+        {"motion_in_gap",
+         fmt::format("{}: the fit ends at {} s: no sample is recorded from there to {} s, and the "
+                     "drive moves meanwhile; how is not known, and the tissue remembers it",
+                     r.name, significant(time[i], 6), significant(time[i + 1], 6))});
+    return;
+  }
+}
+
 void add_rise_delays(FitConfig& config, const PreparedRecording& r, std::size_t i,
                      const std::string& suffix) {
   const std::vector<UnseenRise> rises = unseen_rises(r);

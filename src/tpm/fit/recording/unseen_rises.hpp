@@ -27,6 +27,13 @@ struct UnseenRise {
 /// samples, show a rise well enough.
 [[nodiscard]] std::vector<UnseenRise> unseen_rises(const PreparedRecording& recording);
 
+/// Ends the window of the recording before a gap in which the drive moved, and says so in its
+/// remarks: an interval of many times the neighbouring ones, across which the drive neither rests
+/// nor goes on as fast as before. How it moved is unknown for as long as the gap lasts, and the
+/// tissue remembers it; within an interval of the sampling it is a rise (unseen_rises). Leaves the
+/// window as it is where no ramp was recorded before the gap.
+void end_before_unseen_motion(PreparedRecording& recording);
+
 /// Adds the delay of each of these rises to what is estimated, with a prior of the mean and
 /// standard deviation of its distribution.
 /// @param i place of the recording in config.data

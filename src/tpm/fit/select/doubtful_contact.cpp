@@ -28,10 +28,15 @@ bool is_counted_from_contact(const ParameterResult& p) {
                          p.parameter.name == "exponent");
 }
 
+/// True if the fit claims to know it much better than what was measured before.
+bool is_much_surer(const ParameterResult& p, const Prior& prior) {
+  constexpr double kMuchLess = 3.0;  // times the standard error
+  return p.standard_error && prior.sd >= kMuchLess * *p.standard_error;
+}
+
 }  // namespace
 
 void doubt_contact(FitResult& fit) {
-  constexpr double kMuchLess = 3.0;  // times the standard error
   if (!fit.config.law || fit.config.law->kernel != Kernel::power) return;
   if (!has_exponent_of_no_probe(fit)) return;
   const Remark doubt{kContactOrLoading, "contact or a loading that is no power of the depth"};
@@ -44,15 +49,20 @@ void doubt_contact(FitResult& fit) {
   for (std::size_t i = 0; i < fit.parameters.size() && i < fit.config.parameters.size(); ++i) {
     ParameterResult& p = fit.parameters[i];
     const auto& prior = fit.config.parameters[i].prior;
-    const bool contact = p.nuisance && is_contact(fit.config, i);
-    if (!contact || p.verdict != Verdict::identified || p.not_separable) continue;
-    if (!prior || !p.standard_error || prior->sd < kMuchLess * *p.standard_error) continue;
+    if (!p.nuisance || !is_contact(fit.config, i) || !prior || p.not_separable) continue;
+    // A contact that even the power leaves open, or at the end of its range, is no surer.
+    const bool found = p.verdict == Verdict::identified;
+    if (found && !is_much_surer(p, *prior)) continue;
     mark(p);
     doubted = true;
   }
   if (!doubted) return;
-  for (ParameterResult& p : fit.parameters) {
-    if (is_counted_from_contact(p)) mark(p);
+  for (std::size_t i = 0; i < fit.parameters.size() && i < fit.config.parameters.size(); ++i) {
+    ParameterResult& p = fit.parameters[i];
+    const auto& prior = fit.config.parameters[i].prior;
+    // So is a zero that follows from the power alone.
+    const bool zero = p.nuisance && p.parameter.name.starts_with("offset") && prior;
+    if (is_counted_from_contact(p) || (zero && is_much_surer(p, *prior))) mark(p);
   }
 }
 

@@ -6,9 +6,10 @@ namespace tpm::fit {
 /// A kernel whose fitted exponent is that of no probe (1 of a punch, 1.5 of a ball, 2 of a cone) is
 /// a power that happens to follow the loading, of a thin layer or a tissue that stiffens, say. It
 /// leads back to a contact of its own, which may lie far in the air. Where what was measured of the
-/// contact is much less sure than the fit, contact is not called identified
-/// (ParameterResult::not_separable), nor are the stiffnesses and the exponent: they describe a
-/// power of the depth from that contact, and hold at no depth from another. The covariance does not
+/// contact is much less sure than the fit, or where the fit leaves contact open, contact is not
+/// called identified (ParameterResult::not_separable), nor are the stiffnesses and the exponent:
+/// they describe a power of the depth from that contact, and hold at no depth from another. Nor is
+/// a zero of the force that no rest tells. The covariance does not
 /// tell how far they are off, as it supposes the power. Relaxation times are left as they are: they
 /// follow from the course of the force while the depth is constant, for any loading.
 void doubt_contact(FitResult& fit);

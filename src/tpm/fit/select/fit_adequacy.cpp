@@ -17,7 +17,7 @@
 #include "tpm/fit/recording/carried_noise.hpp"
 #include "tpm/fit/recording/motion_before_load.hpp"
 #include "tpm/fit/select/configuration_remarks.hpp"
-#include "tpm/fit/select/doubtful_contact.hpp"
+#include "tpm/fit/select/doubtful_zero.hpp"
 #include "tpm/fit/select/history_before_window.hpp"
 #include "tpm/fit/select/law_choice.hpp"
 #include "tpm/fit/select/reading_scatter.hpp"
@@ -432,7 +432,7 @@ std::size_t samples_at_rest(const RecordingPhases& phases) {
 
 void state_adequacy(FitResult& fit, std::span<const PreparedRecording> recordings,
                     std::size_t fits) {
-  doubt_contact(fit);
+  doubt_placement(fit, recordings);
   const std::vector<RestedRecording> rests = rested(recordings);
   const auto worst = worst_of(fit, rests, fits);
   if (worst) state(fit, stated(fit, *worst, 1, {}));
@@ -452,7 +452,7 @@ void state_adequacy(Selection& s, std::span<const PreparedRecording> recordings)
   for (const auto i : {std::optional(s.recommended), s.preferred}) {
     if (!i) continue;
     Candidate& c = s.candidates[*i];
-    doubt_contact(c.fit);
+    doubt_placement(c.fit, recordings);
     if (!doubt_history(c.fit) || !c.identified) continue;
     c.identified = false;
     c.reason = "history before the window is not in the fit";
@@ -464,7 +464,7 @@ void state_adequacy(Selection& s, std::span<const PreparedRecording> recordings)
 }
 
 void state_adequacy(FitResult& fit, const std::vector<DataSet>& data) {
-  doubt_contact(fit);
+  doubt_placement(fit, data);
   std::optional<Judged> judged = against_stated_noise(fit);
   if (!judged && !fit.recordings.empty()) {
     std::vector<RestedRecording> rests(data.size());

@@ -17,6 +17,7 @@
 #include "tpm/fit/recording/loading_sense.hpp"
 #include "tpm/fit/recording/placement.hpp"
 #include "tpm/fit/recording/start_up.hpp"
+#include "tpm/fit/recording/unseen_rises.hpp"
 #include "tpm/fit/select/clipping.hpp"
 #include "tpm/fit/select/imposed_channel.hpp"
 #include "tpm/fit/select/placement_parameters.hpp"
@@ -76,6 +77,16 @@ bool falls_instead(std::span<const double> values, double start, double noise_sd
   return fall > kMuch * std::max(rise, 0.0) && fall > kNoise * noise_sd;
 }
 
+/// A response that falls towards 0, and not below it, from a start far above it: a load that is
+/// taken away. One that is counted the other way begins near 0 and falls below.
+bool starts_loaded(std::span<const double> response, double noise_sd) {
+  constexpr double kBelow = 0.1;  // of the start
+  constexpr double kNoise = 4.0;
+  const double lowest = *std::ranges::min_element(response);
+  return lowest > -std::max(kBelow * response.front(), kNoise * noise_sd) &&
+         response.front() > std::abs(lowest);
+}
+
 /// Number of samples, from the first one on, in which the drive rests.
 std::size_t samples_of_still_drive(const PreparedRecording& r) {
   constexpr double kStill = 1e-4;  // of the range
@@ -122,6 +133,15 @@ void require_rise(const PreparedRecording& r) {
   if (!down && !response_down) return;
   if (!down) require_no_start_up(r, response);
   const bool both = down && response_down;
+  if (both && starts_loaded(response, r.phases.noise_sd_estimate)) {
+    throw bad_input(
+        fmt::format("recording '{}'", r.name),
+        "it begins under a load: drive and response fall from where they start, the response "
+        "towards 0",
+        "the recording from before the load on (what the tissue went through before the first "
+        "sample is unknown), or --negate-drive --negate-response, if the machine counts them the "
+        "other way from a zero of its own");
+  }
   const bool turns_drive = r.load_imposed ? response_down : down;  // the option that does
   throw bad_input(fmt::format("recording '{}'", r.name),
                   both   ? "the drive falls, and so does the response"
@@ -268,6 +288,7 @@ PreparedRecording prepare_recording(std::string name, Recording recording,
     r.to_s = time[phase.first];
     break;
   }
+  end_before_unseen_motion(r);
   if (!r.load_imposed) find_clipping(r);
   if (const std::size_t rest = samples_before_load(r.recording); rest > 0) {
     r.from_s = time[rest];

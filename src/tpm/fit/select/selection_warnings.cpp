@@ -68,15 +68,27 @@ Outside outside_of(const RecordingFit& r) {
   return o;
 }
 
+/// True if samples are missing after the last fitted one, see end_before_unseen_motion.
+bool ends_before_gap(const RecordingFit& r, double last_fitted_s) {
+  constexpr double kGap = 20.0;  // times the interval before
+  const auto next = static_cast<std::size_t>(std::ranges::upper_bound(r.time_s, last_fitted_s) -
+                                             r.time_s.begin());
+  if (next < 2 || next >= r.time_s.size()) return false;
+  return r.time_s[next] - last_fitted_s >= kGap * (last_fitted_s - r.time_s[next - 2]);
+}
+
 /// The fitted part, the reason for its end, and how to fit another one.
 std::string window_words(const std::string& name, const RecordingFit& r, const Outside& o) {
   const auto first = std::ranges::find(r.fitted, true);
   const auto begin = static_cast<std::size_t>(first - r.fitted.begin());
   return fmt::format(
-      "{}: fitted from {} to {} s: the fit ends where the drive first falls back, because contact "
-      "may shrink from there on; to fit more, give the recording a later \"to\" in config.json "
+      "{}: fitted from {} to {} s{}; to fit more, give the recording a later \"to\" in config.json "
       "and fit that file; --from-time and --until fit less",
-      name, significant(r.time_s[begin], 4), significant(o.last_fitted_s, 4));
+      name, significant(r.time_s[begin], 4), significant(o.last_fitted_s, 4),
+      ends_before_gap(r, o.last_fitted_s)
+          ? ""
+          : ": the fit ends where the drive first falls back, because contact may shrink from "
+            "there on");
 }
 
 /// Depths of soft tissue are millimetres: metres come from a unit that is not the file's.
@@ -186,6 +198,8 @@ std::vector<Remark> outside_remarks(const FitResult& fit) {
                name, significant(o.last_fitted_s, 4), o.predicted, significant(o.last_drive, 3),
                significant(100.0 * rms / r.peak, 3),
                describes ? ""
+               : ends_before_gap(r, o.last_fitted_s)
+                   ? ": it supposes that the drive moved evenly where no sample is recorded"
                : o.turned_squares > kMostly * o.sum_of_squares
                    ? ": there the load turns its sign (a specimen that is gripped, glued or "
                      "sticks), and these laws have none of that sign"
