@@ -233,7 +233,7 @@ void fit_rests(const RestSamples& rest, double rounding, const std::optional<Hol
   result.origin_s = line.origin_s;
   result.zero = line.zero;
   result.drift = line.slope;
-  result.likely_drift_sd = line.likely_slope_sd;
+  result.telling_drift_sd = line.telling_slope_sd;
   estimate.zero_limit = line.zero_limit;
   estimate.drift_limit = line.slope_limit;
 }
@@ -284,7 +284,7 @@ RestEstimate estimate_rests(const PreparedRecording& recording) {
   result.zero = Measured{level, constant ? rounding : noise / std::sqrt(n)};
   if (constant && rest.reading.size() >= kFewestForSlope) {
     result.drift = Measured{0.0, std::sqrt(12.0) * rounding / length};
-    result.likely_drift_sd = result.drift->sd;
+    result.telling_drift_sd = result.drift->sd;
   }
   return estimate;
 }
@@ -354,7 +354,7 @@ std::optional<LevelBeforeLoad> level_before_load(const PreparedRecording& r) {
 DriftFinding drift_finding(const PreparedRecording& r, const RestReadings& rests) {
   const auto most = most_drift_sd(r, rests);
   if (!most) return DriftFinding::no_hold;
-  const bool told = rests.drift && rests.likely_drift_sd <= *most;
+  const bool told = rests.drift && rests.telling_drift_sd <= *most;
   return told ? DriftFinding::told : DriftFinding::not_separable;
 }
 

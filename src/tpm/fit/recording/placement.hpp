@@ -27,7 +27,7 @@ struct RestReadings {
   std::optional<Measured> zero;       ///< of the response, at origin_s; none without samples before
                                       ///< contact
   std::optional<Measured> drift;      ///< of the zero, per second; none below 8 samples
-  double likely_drift_sd = 0.0;       ///< of the drift at the most likely phi
+  double telling_drift_sd = 0.0;      ///< of the drift, by which drift_finding decides
   bool pulled = false;                ///< after withdrawal (is_pulled_after): `after` is 0
 };
 
@@ -92,9 +92,10 @@ enum class DriftFinding {
                   ///< there is no rest
 };
 
-/// The uncertainty at the most likely phi decides, and not the stated one, which counts every phi
-/// that the readings leave possible: it is larger, the less is known of phi, and recordings whose
-/// correlation seems small by chance would be told and the others not.
+/// Where the hold has the noise of the rests, the uncertainty at the most likely phi decides, and
+/// not the stated one, which counts every phi that the readings leave possible: that one is larger,
+/// the less is known of phi, and recordings whose correlation seems small by chance would be told
+/// and the others not.
 /// @return told only if that uncertainty of the slope times the time from contact to the end of
 ///         the longest hold is at most 2 % of the force there
 [[nodiscard]] DriftFinding drift_finding(const PreparedRecording& recording,
@@ -108,9 +109,9 @@ struct MeasuredPlacement {
 };
 
 /// The finding about a drift depends on the estimated noise. Rests whose noise seems small by
-/// chance tell it more often. Where the correlation is not significant and the standard deviation
-/// at the upper end of the 95 % interval of the noise would not tell it, zero and drift have that
-/// one. Intervals that count every possible phi are wide enough.
+/// chance tell it more often. Where the standard deviation at the upper end of the 95 % interval of
+/// the noise would not tell it, zero and drift have that one; but for correlated noise that is that
+/// of the hold, too, which makes most of them told (drift_finding).
 [[nodiscard]] MeasuredPlacement measure_placement(const PreparedRecording& recording,
                                                   const LawSpec& law,
                                                   std::optional<double> exponent);

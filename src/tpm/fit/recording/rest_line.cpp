@@ -86,29 +86,45 @@ class EstimateOfAnyPhi {
   /// Standard deviation of a normal distribution about a value whose 95 % interval is as probable.
   [[nodiscard]] double sd_about(double value) const {
     constexpr double kHeld = 0.95;
-    constexpr int kHalvings = 20, kMostDoublings = 60;
-    const auto holds = [&](double half) {
+    const double half = solved([&](double h) {
       double held = 0.0;
       for (const One& o : of_) {
-        held += o.weight * (student_cdf((value + half - o.value) / o.sd, degrees_) -
-                            student_cdf((value - half - o.value) / o.sd, degrees_));
+        held += o.weight * (student_cdf((value + h - o.value) / o.sd, degrees_) -
+                            student_cdf((value - h - o.value) / o.sd, degrees_));
       }
       return held >= kHeld;
-    };
-    double low = 0.0, high = 0.0;
-    for (const One& o : of_) high = std::max(high, o.sd);
-    for (int i = 0; i < kMostDoublings && !holds(high); ++i) high *= 2.0;
-    for (int i = 0; i < kHalvings; ++i) {
-      const double middle = 0.5 * (low + high);
-      (holds(middle) ? high : low) = middle;
-    }
-    return high / normal_quantile(0.5 + 0.5 * kHeld);
+    });
+    return half / normal_quantile(0.5 + 0.5 * kHeld);
+  }
+  /// Upper end of the 95 % interval of its standard deviation.
+  [[nodiscard]] double upper_sd() const {
+    constexpr double kWithin = 0.975;
+    return solved([&](double sd) {
+      double below = 0.0;
+      for (const One& o : of_) {
+        below += o.weight * chi_squared_tail(degrees_ * (o.sd / sd) * (o.sd / sd), degrees_);
+      }
+      return below >= kWithin;
+    });
   }
 
  private:
   struct One {
     double weight, value, sd;
   };
+  /// The least number above 0 from which on a condition is met.
+  template <class Condition>
+  [[nodiscard]] double solved(const Condition& met) const {
+    constexpr int kHalvings = 20, kMostDoublings = 60;
+    double low = 0.0, high = 0.0;
+    for (const One& o : of_) high = std::max(high, o.sd);
+    for (int i = 0; i < kMostDoublings && !met(high); ++i) high *= 2.0;
+    for (int i = 0; i < kHalvings; ++i) {
+      const double middle = 0.5 * (low + high);
+      (met(middle) ? high : low) = middle;
+    }
+    return high;
+  }
 
   double degrees_;
   std::vector<One> of_;
@@ -174,17 +190,23 @@ RestLine fit_rest_line(const std::vector<double>& time_s, const std::vector<doub
                       : covariance(0, 0));
   const double stated_zero =
       correlated ? any_zero.sd_about(zero_value) : students(zero_sd, degrees(0));
-  const double limit_of_zero = correlated ? stated_zero : upper_end(zero_sd, degrees(0));
+  // A rest alone may hold a motion that seems to be correlated noise; a hold about its own curve
+  // confirms phi.
+  const bool confirmed = correlated && hold != nullptr;
+  const double limit_of_zero = confirmed    ? stated_zero
+                               : correlated ? any_zero.upper_sd()
+                                            : upper_end(zero_sd, degrees(0));
   result.zero = Measured{level + zero_value, std::hypot(stated_zero, rounding)};
   result.zero_limit = std::hypot(limit_of_zero, rounding);
   if (p == 1) return result;
   const double slope_sd = std::sqrt(covariance(1, 1));
-  const double likely_slope = students(slope_sd, degrees(1));
-  const double stated_slope = correlated ? any_slope.sd_about(x[1]) : likely_slope;
-  const double limit_of_slope = correlated ? stated_slope : upper_end(slope_sd, degrees(1));
+  const double stated_slope =
+      correlated ? any_slope.sd_about(x[1]) : students(slope_sd, degrees(1));
+  const double limit_of_slope = confirmed    ? stated_slope
+                                : correlated ? any_slope.upper_sd()
+                                             : upper_end(slope_sd, degrees(1));
   result.slope = Measured{x[1] / length, std::hypot(stated_slope, rounding) / length};
-  // Of so few degrees Student's factor would let chance decide again.
-  result.likely_slope_sd = std::hypot(correlated ? slope_sd : likely_slope, rounding) / length;
+  result.telling_slope_sd = std::hypot(confirmed ? slope_sd : stated_slope, rounding) / length;
   result.slope_limit = std::hypot(limit_of_slope, rounding) / length;
   return result;
 }

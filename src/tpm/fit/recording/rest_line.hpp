@@ -27,9 +27,10 @@ struct RestLine {
   double origin_s = 0.0;  ///< where zero and slope are uncorrelated
   Measured zero;          ///< at origin_s
   std::optional<Measured> slope;
-  double likely_slope_sd = 0.0;  ///< of the slope at phi
-  /// Standard deviations at the upper end of the 95 % interval of the noise; the stated ones where
-  /// these count every phi.
+  /// Of the slope, at phi alone where a hold confirms it: whether the slope is told.
+  double telling_slope_sd = 0.0;
+  /// Standard deviations at the upper end of the 95 % interval of the noise; the stated ones, which
+  /// count every phi, where a hold confirms phi.
   double zero_limit = 0.0, slope_limit = 0.0;
 };
 
