@@ -13,6 +13,7 @@
 #include "tpm/base/median.hpp"
 #include "tpm/base/namespaces.hpp"
 #include "tpm/base/text.hpp"
+#include "tpm/fit/residual_jumps.hpp"
 #include "tpmkit/error.hpp"
 
 namespace tpm::fit {
@@ -273,86 +274,6 @@ std::optional<EqualRun> frozen_run(const AdequacyData& data, const RestNoise& no
   return run;
 }
 
-/// One reading or two in a row on one side that leave their neighbours and return.
-struct Spike {
-  std::size_t first = 0, length = 0;
-  double size = 0.0;  ///< off the line between the readings beside
-};
-
-/// Values first, first + 1, ... that are all off the line between those beside them by more than 8
-/// robust standard deviations on one side, while those are near their own neighbours.
-std::optional<Spike> spike_at(std::span<const double> values, std::size_t first, std::size_t length,
-                              double far) {
-  constexpr double kNear = 0.25;  // of the spike
-  const double before = values[first - 1], after = values[first + length];
-  double least = HUGE_VAL, most = -HUGE_VAL;
-  for (std::size_t k = 0; k < length; ++k) {
-    const double share = static_cast<double>(k + 1) / static_cast<double>(length + 1);
-    const double off = values[first + k] - before - share * (after - before);
-    least = std::min(least, off);
-    most = std::max(most, off);
-  }
-  const double size = least > 0.0 ? least : most < 0.0 ? -most : 0.0;
-  const double near = kNear * size;
-  const bool alone = std::abs(before - values[first - 2]) < near &&
-                     std::abs(after - values[first + length + 1]) < near &&
-                     std::abs(after - before) < near;
-  if (size <= far || !alone) return std::nullopt;
-  return Spike{first, length, std::max(most, -least)};
-}
-
-/// A spike that holds most of the squares of the residuals.
-std::optional<Spike> spike_in(std::span<const double> residual) {
-  constexpr std::size_t kFewest = 20, kLongest = 2;
-  constexpr double kFar = 8.0, kOfMedian = 1.4826, kMost = 0.5;
-  if (residual.size() < kFewest) return std::nullopt;
-  std::vector<double> off;
-  for (std::size_t i = 1; i + 1 < residual.size(); ++i) {
-    off.push_back(std::abs(residual[i] - 0.5 * (residual[i - 1] + residual[i + 1])));
-  }
-  const double far = kFar * kOfMedian * median(std::move(off));
-  const double all = squares_about(residual, 0.0);
-  for (std::size_t length = 1; far > 0.0 && length <= kLongest; ++length) {
-    for (std::size_t i = 2; i + length + 1 < residual.size(); ++i) {
-      const auto spike = spike_at(residual, i, length, far);
-      if (spike && squares_about(residual.subspan(i, length), 0.0) > kMost * all) return spike;
-    }
-  }
-  return std::nullopt;
-}
-
-/// A reading that is far from the one before it, and the next ones stay there, where the drive has
-/// come to rest: as when a specimen slips, or a force cell is tared under a load.
-struct Jump {
-  double at_s = 0.0;
-  double by = 0.0;
-};
-
-std::optional<Jump> jump_under_load(const AdequacyData& data, const RestNoise& noise) {
-  constexpr std::size_t kAround = 5;            // samples on each side
-  constexpr double kFar = 20.0;                 // standard deviations of the noise
-  constexpr double kAlone = 4.0, kStays = 0.5;  // times the steps around it; of the jump
-  const std::span<const double> residual = data.residual;
-  const auto hold = static_cast<std::size_t>(std::ranges::upper_bound(data.time_s, data.ramp_to_s) -
-                                             data.time_s.begin());
-  std::optional<Jump> largest;
-  for (std::size_t i = hold + 2 * kAround; i + kAround < residual.size(); ++i) {
-    const double step = residual[i] - residual[i - 1];
-    if (std::abs(step) <= kFar * std::sqrt(noise.variance)) continue;
-    if (largest && std::abs(step) <= std::abs(largest->by)) continue;
-    double around = 0.0;
-    for (std::size_t k = 1; k < kAround; ++k) {
-      around = std::max({around, std::abs(residual[i + k] - residual[i + k - 1]),
-                         std::abs(residual[i - k] - residual[i - k - 1])});
-    }
-    const double stays =
-        (mean_of(residual.subspan(i, kAround)) - mean_of(residual.subspan(i - kAround, kAround))) /
-        step;
-    if (std::abs(step) > kAlone * around && stays > kStays) largest = Jump{data.time_s[i], step};
-  }
-  return largest;
-}
-
 std::vector<Remark> causes_of(const AdequacyData& data, const RestNoise& noise, double level) {
   std::vector<Remark> causes;
   const double sd = std::sqrt(noise.variance);
@@ -382,7 +303,8 @@ std::vector<Remark> causes_of(const AdequacyData& data, const RestNoise& noise, 
                      "rounding makes",
                      run->length, significant(data.time_s[run->first], 4))});
   }
-  if (const auto jump = jump_under_load(data, noise); jump && causes.empty()) {
+  if (const auto jump = jump_under_load(data.time_s, data.residual, data.ramp_to_s, sd);
+      jump && causes.empty()) {
     causes.push_back(
         {"jump", fmt::format("a slip, or a zero that was set under a load: at {} s readings change "
                              "by {} noises from one to the next",

@@ -143,7 +143,8 @@ std::string pulled_words(const FitResult& fit, const RecordingFit& r) {
   const double fitted_s = r.time_s[static_cast<std::size_t>(first - r.fitted.begin())];
   if (!(memory_s > 0.0) || fitted_s - pulled->last_s >= kForgotten * memory_s) return {};
   return fmt::format(
-      "{}: before the fitted part, from {} s on, the force pulls by up to {} % of the peak where the "
+      "{}: before the fitted part, from {} s on, the force pulls by up to {} % of the peak where "
+      "the "
       "law has lost contact: a specimen that is glued, gripped or sticks; the law does not have "
       "the history that the fitted part remembers",
       fit.config.data[r.choice].dataset, significant(pulled->at_s, 4),
