@@ -423,8 +423,7 @@ SolidFilling counted_filling(const Surface& surface, const SolidRequest& request
     filling = lattice_filling(surface, request, spacing, 2 * count, known, 0.0);
     add_support(surface, filling, kWantedInside, count);
     if (filling.count() >= count) break;
-    // A little more than lacks: how many support the outer layer differs from filling to filling.
-    lattice += count - filling.count() + count / 1000;
+    lattice += count - filling.count() + count / 1000;  // the number of supports varies a little
   }
   for (int wanted = kWantedInside + 1; filling.count() < count && wanted < kMostInside; ++wanted) {
     add_support(surface, filling, wanted, count - filling.count());
