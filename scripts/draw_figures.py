@@ -20,14 +20,12 @@ import matplotlib
 matplotlib.use("Agg")
 
 import matplotlib.pyplot as plt  # noqa: E402  (the backend is chosen first)
-from drawing_files import literal, save_drawing  # noqa: E402
+from drawing_files import FONT, literal, save_drawing, text_width  # noqa: E402
 from matplotlib.colors import to_hex, to_rgba  # noqa: E402
-from matplotlib.font_manager import FontProperties  # noqa: E402
 from matplotlib.lines import Line2D  # noqa: E402
 from matplotlib.patches import Patch, Rectangle  # noqa: E402
 from matplotlib.patheffects import withStroke  # noqa: E402
 from matplotlib.ticker import FixedLocator, FuncFormatter, MaxNLocator, NullLocator  # noqa: E402
-from matplotlib.textpath import text_to_path  # noqa: E402
 
 # Lengths in inches, so that text keeps its size whatever the number of panels. Widths of journals: two columns
 # (180 mm), and one and a half (130 mm) for one panel. At 400 pixels the text of the wider is still 7 pixels high.
@@ -83,7 +81,7 @@ STYLE = {
     "svg.fonttype": "none",  # text: it can be searched, copied and edited
     "pdf.fonttype": 42,
     "svg.hashsalt": "tpmkit",
-    "font.family": ["DejaVu Sans"],
+    "font.family": [FONT],
     "font.size": 9,
     "axes.titlesize": TITLE_SIZE,
     "axes.labelsize": 9,
@@ -370,11 +368,6 @@ def lettered(letter, title):
     if not letter or re.match(r"\([a-z]\)( |$)", title):
         return title
     return f"({letter}) {title}".strip()
-
-
-def text_width(text, size):
-    """Inches of a line of text of `size` points."""
-    return text_to_path.get_text_width_height_descent(text, FontProperties(family=STYLE["font.family"], size=size), False)[0] / 72
 
 
 def wrapped(parts, size, width, between=" "):

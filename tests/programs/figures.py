@@ -1,6 +1,6 @@
 #!/usr/bin/env python3
-"""What scripts/draw_figures.py makes of a small figures.json: text that is text, letters, limits, provenance, files;
-and what the views of scripts/draw_deformation.py hold.
+"""What scripts/draw_figures.py makes of a small figures.json: text that is text, letters, limits, provenance, files,
+names beside levels; and what the views of scripts/draw_deformation.py hold.
 
     figures.py TPM (not used)
 """
@@ -53,6 +53,37 @@ def faults_of_verdicts():
     for names, wanted in ((["rk4", "ida"], "rk4, ida"), (["a long name of a method"] * 4, "a long name of a method and 3 more")):
         if work_precision.fitting_names(names, 2.0) != wanted:
             faults.append(f"names beside a band: {work_precision.fitting_names(names, 2.0)}; expected {wanted}")
+    return faults
+
+
+def faults_of_trails(folder):
+    """The name of a level leaves the points free; a measured cost is said to be measured; no two methods look alike."""
+    sys.path.insert(0, str(SCRIPT.parent))
+    import work_precision
+    faults = []
+    places = [(0.1, 0.22), (0.9, 0.5)]
+    for height, wanted in ((0.2, "right"), (0.48, "left"), (0.7, "left")):
+        if work_precision.freer_side(places, height) != wanted:
+            faults.append(f"the name of a level at {height} does not stand at the {wanted} of points at {places}")
+    for name, (colour, marker) in work_precision.LOOKS.items():
+        blues = {work_precision.BLUE, work_precision.SKY}
+        like = [n for n, (c, m) in work_precision.LOOKS.items() if n != name and m == marker and {c, colour} == blues]
+        if like:
+            faults.append(f"'{name}' looks like {like}: one marker in two blues")
+    axes = {"y": {"quantity": "error", "unit": "", "logarithmic": True}}
+    trail = {"kind": "trail", "label": "rk4", "provenance": "model", "x": [1e-3, 1e-1], "y": [2e-6, 1e-3]}
+    level = {"kind": "level", "label": "", "provenance": "model", "y": [1e-6], "text": "reference known to"}
+    figures = [{"id": id, "title": "", "caption": "", "panels": [
+        {"title": "", "x": {"quantity": quantity, "unit": "s", "logarithmic": True}, **axes, "series": [trail, level]}]}
+        for id, quantity in (("wall", "wall time of a step"), ("counts", "evaluations"))]
+    (folder / "trails.json").write_text(json.dumps({"figures": figures}))
+    subprocess.run([sys.executable, SCRIPT, folder / "trails.json", folder / "trails"], check=True)
+    for id, wanted in (("wall", "wall times measured on one machine"), ("counts", "work counted")):
+        words = {e.text: e for e in tree.parse(folder / f"trails/{id}.svg").iter() if e.tag.endswith("}text")}
+        if not any((text or "").endswith(wanted) for text in words):
+            faults.append(f"{id}: no note '{wanted}': {list(words)}")
+        if "end" not in words["reference known to"].get("style", ""):
+            faults.append(f"{id}: the name of the level stands over a point at its left end")
     return faults
 
 
@@ -116,7 +147,7 @@ def main():
         subprocess.run([sys.executable, SCRIPT, folder / "figures.json", folder / "pdf", "--pdf"], check=True)
         if {f.name for f in (folder / "pdf").iterdir()} != {f"{id}.{ending}" for id in "abcd" for ending in ("svg", "pdf")}:
             faults.append(f"--pdf wrote {sorted(f.name for f in (folder / 'pdf').iterdir())}")
-        faults += faults_of_layout(tree.parse(folder / "x/d.svg"))
+        faults += faults_of_layout(tree.parse(folder / "x/d.svg")) + faults_of_trails(folder)
     for fault in faults:
         print(fault)
     print(f"{len(faults)} faults")
