@@ -413,8 +413,8 @@ def draw_figure(figure):
     notes = wrapped((figure.get("note") or "").split(), NOTE_SIZE, room) + wrapped(provenance_note(figure), NOTE_SIZE, room, "; ")
     across = min(len(panels), MOST_ACROSS)
     panel_width = (room - (across - 1) * GAP) / across
-    titles = [wrapped(lettered(letter_of(i, len(panels)), plain_name(panel["title"])).split(" "), TITLE_SIZE, panel_width + GAP / 2)
-              for i, panel in enumerate(panels)]
+    titles = [wrapped(lettered(letter_of(i, len(panels)), plain_name(panel["title"])).split(" "), TITLE_SIZE,
+                      panel_width + (GAP / 2 if (i + 1) % across else RIGHT - EDGE)) for i, panel in enumerate(panels)]
     top = TOP + (max(len(lines) for lines in titles) - 1) * TITLE_ROW
     below_axis = BELOW_AXIS + below_names(panels, panel_width)
     below = below_axis + rows * LEGEND_ROW + 0.10 + len(notes) * NOTE_ROW + 0.08

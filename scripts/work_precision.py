@@ -5,6 +5,8 @@ in a band above the panel, in a row that says how, at the cost at which it did. 
 lists names.
 """
 
+import math
+
 import matplotlib.pyplot as plt
 from drawing_files import text_width
 from matplotlib.lines import Line2D
@@ -106,6 +108,12 @@ def fitting_names(names, width):
     return f"{len(names)} methods"
 
 
+def widest_gap(shares):
+    """Between places on an axis (shares of its length): where it begins, and how long it is."""
+    ends = [0.0, *sorted(shares), 1.0]
+    return max(((low, high - low) for low, high in zip(ends, ends[1:])), key=lambda gap: gap[1])
+
+
 def draw_band(band, panel, rows, look):
     band.set_ylim(-0.5, len(rows) - 0.5)
     band.set_yticks(range(len(rows)), rows, fontsize=BAND_SIZE)
@@ -119,8 +127,11 @@ def draw_band(band, panel, rows, look):
             band.plot(series["x"], [row] * len(series["x"]), linestyle="none", zorder=4, **marker_style(look[series["label"]]))
         unplaced = [s["label"] for s in row_series if not s["x"]]
         if unplaced:
-            width = 0.98 * band.get_position().width * band.figure.get_figwidth()
-            band.text(0.01, row, fitting_names(unplaced, width), transform=band.get_yaxis_transform(), fontsize=NAME_SIZE, va="center", color=BLACK)
+            places = [x for series in row_series for x in series["x"]]
+            low, high = (math.log(x) for x in band.get_xlim())
+            start, length = widest_gap([(math.log(x) - low) / (high - low) for x in places])
+            width = (length - 0.02) * band.get_position().width * band.figure.get_figwidth()
+            band.text(start + 0.01, row, fitting_names(unplaced, width), transform=band.get_yaxis_transform(), fontsize=NAME_SIZE, va="center", color=BLACK)
 
 
 def limits(panel):

@@ -5,6 +5,7 @@ names beside levels; and what the views of scripts/draw_deformation.py hold.
     figures.py TPM (not used)
 """
 import json
+import re
 import subprocess
 import sys
 import tempfile
@@ -65,6 +66,9 @@ def faults_of_trails(folder):
     for height, wanted in ((0.2, "right"), (0.48, "left"), (0.7, "left")):
         if work_precision.freer_side(places, height) != wanted:
             faults.append(f"the name of a level at {height} does not stand at the {wanted} of points at {places}")
+    for shares, wanted in (([], (0.0, 1.0)), ([0.75, 0.5], (0.0, 0.5)), ([0.25], (0.25, 0.75))):
+        if work_precision.widest_gap(shares) != wanted:
+            faults.append(f"the widest gap between {shares} is {work_precision.widest_gap(shares)}; expected {wanted}")
     for name, (colour, marker) in work_precision.LOOKS.items():
         blues = {work_precision.BLUE, work_precision.SKY}
         like = [n for n, (c, m) in work_precision.LOOKS.items() if n != name and m == marker and {c, colour} == blues]
@@ -99,6 +103,11 @@ def faults_of_layout(drawing):
             panels[group.get("id")] = round(float(numbers[1]))
     if len(panels) != 3 or len(set(panels.values())) != 2:
         faults.append(f"three panels do not stand in two columns: left edges {panels}")
+    from drawing_files import text_width
+    for line in (e for e in root.iter() if e.tag.endswith("}text") and "title of a panel" in (e.text or "")):
+        end = float(re.search(r"[(=] ?([0-9.]+)", line.get("transform") or f"={line.get('x')}")[1]) + 72 * text_width(line.text, 9.5)
+        if end > width:
+            faults.append(f"a title ends at {end:.0f} points, the page at {width:.0f}: {line.text}")
     words = [e.text for e in root.iter() if e.tag.endswith("}text")]
     if any(len(w or "") > 110 for w in words) or any("A title" in (w or "") and len(w) > 60 for w in words):
         faults.append(f"a text is not wrapped: {words}")
