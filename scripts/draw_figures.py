@@ -20,14 +20,12 @@ import matplotlib
 matplotlib.use("Agg")
 
 import matplotlib.pyplot as plt  # noqa: E402  (the backend is chosen first)
-from drawing_files import literal, save_drawing  # noqa: E402
+from drawing_files import FONT, literal, save_drawing, text_width  # noqa: E402
 from matplotlib.colors import to_hex, to_rgba  # noqa: E402
-from matplotlib.font_manager import FontProperties  # noqa: E402
 from matplotlib.lines import Line2D  # noqa: E402
 from matplotlib.patches import Patch, Rectangle  # noqa: E402
 from matplotlib.patheffects import withStroke  # noqa: E402
 from matplotlib.ticker import FixedLocator, FuncFormatter, MaxNLocator, NullLocator  # noqa: E402
-from matplotlib.textpath import text_to_path  # noqa: E402
 
 # Lengths in inches, so that text keeps its size whatever the number of panels. Widths of journals: two columns
 # (180 mm), and one and a half (130 mm) for one panel. At 400 pixels the text of the wider is still 7 pixels high.
@@ -83,7 +81,7 @@ STYLE = {
     "svg.fonttype": "none",  # text: it can be searched, copied and edited
     "pdf.fonttype": 42,
     "svg.hashsalt": "tpmkit",
-    "font.family": ["DejaVu Sans"],
+    "font.family": [FONT],
     "font.size": 9,
     "axes.titlesize": TITLE_SIZE,
     "axes.labelsize": 9,
@@ -372,11 +370,6 @@ def lettered(letter, title):
     return f"({letter}) {title}".strip()
 
 
-def text_width(text, size):
-    """Inches of a line of text of `size` points."""
-    return text_to_path.get_text_width_height_descent(text, FontProperties(family=STYLE["font.family"], size=size), False)[0] / 72
-
-
 def wrapped(parts, size, width, between=" "):
     """Lines no wider than `width` inches, unless a part alone is."""
     lines = []
@@ -420,8 +413,8 @@ def draw_figure(figure):
     notes = wrapped((figure.get("note") or "").split(), NOTE_SIZE, room) + wrapped(provenance_note(figure), NOTE_SIZE, room, "; ")
     across = min(len(panels), MOST_ACROSS)
     panel_width = (room - (across - 1) * GAP) / across
-    titles = [wrapped(lettered(letter_of(i, len(panels)), plain_name(panel["title"])).split(" "), TITLE_SIZE, panel_width + GAP / 2)
-              for i, panel in enumerate(panels)]
+    titles = [wrapped(lettered(letter_of(i, len(panels)), plain_name(panel["title"])).split(" "), TITLE_SIZE,
+                      panel_width + (GAP / 2 if (i + 1) % across else RIGHT - EDGE)) for i, panel in enumerate(panels)]
     top = TOP + (max(len(lines) for lines in titles) - 1) * TITLE_ROW
     below_axis = BELOW_AXIS + below_names(panels, panel_width)
     below = below_axis + rows * LEGEND_ROW + 0.10 + len(notes) * NOTE_ROW + 0.08

@@ -1,4 +1,4 @@
-"""Files of drawings that are complete or absent, and texts that matplotlib draws as they stand.
+"""Files of drawings that are complete or absent, and texts that matplotlib draws as they stand, and how wide they are.
 
 For the scripts that draw: whoever ends one while it writes finds the drawing of before, or none.
 """
@@ -13,6 +13,7 @@ from pathlib import Path
 
 LONGEST_NAME = 255  # bytes; of all usual file systems
 ROOM_FOR_ENDING = 24
+FONT = "DejaVu Sans"  # of all drawings
 MARK = "user.tpm.origin"  # as files/origin_mark.hpp says
 
 
@@ -118,3 +119,10 @@ def literal(value):
     if isinstance(value, dict):
         return {key: item if key == "id" else literal(item) for key, item in value.items()}
     return value
+
+
+def text_width(text, size):
+    """Inches of a line of text of `size` points in FONT."""
+    from matplotlib.font_manager import FontProperties
+    from matplotlib.textpath import text_to_path
+    return text_to_path.get_text_width_height_descent(text, FontProperties(family=[FONT], size=size), False)[0] / 72

@@ -1,10 +1,11 @@
 #!/usr/bin/env python3
-"""What scripts/draw_figures.py makes of a small figures.json: text that is text, letters, limits, provenance, files;
-and what the views of scripts/draw_deformation.py hold.
+"""What scripts/draw_figures.py makes of a small figures.json: text that is text, letters, limits, provenance, files,
+names beside levels; and what the views of scripts/draw_deformation.py hold.
 
     figures.py TPM (not used)
 """
 import json
+import re
 import subprocess
 import sys
 import tempfile
@@ -56,6 +57,40 @@ def faults_of_verdicts():
     return faults
 
 
+def faults_of_trails(folder):
+    """The name of a level leaves the points free; a measured cost is said to be measured; no two methods look alike."""
+    sys.path.insert(0, str(SCRIPT.parent))
+    import work_precision
+    faults = []
+    places = [(0.1, 0.22), (0.9, 0.5)]
+    for height, wanted in ((0.2, "right"), (0.48, "left"), (0.7, "left")):
+        if work_precision.freer_side(places, height) != wanted:
+            faults.append(f"the name of a level at {height} does not stand at the {wanted} of points at {places}")
+    for shares, wanted in (([], (0.0, 1.0)), ([0.75, 0.5], (0.0, 0.5)), ([0.25], (0.25, 0.75))):
+        if work_precision.widest_gap(shares) != wanted:
+            faults.append(f"the widest gap between {shares} is {work_precision.widest_gap(shares)}; expected {wanted}")
+    for name, (colour, marker) in work_precision.LOOKS.items():
+        blues = {work_precision.BLUE, work_precision.SKY}
+        like = [n for n, (c, m) in work_precision.LOOKS.items() if n != name and m == marker and {c, colour} == blues]
+        if like:
+            faults.append(f"'{name}' looks like {like}: one marker in two blues")
+    axes = {"y": {"quantity": "error", "unit": "", "logarithmic": True}}
+    trail = {"kind": "trail", "label": "rk4", "provenance": "model", "x": [1e-3, 1e-1], "y": [2e-6, 1e-3]}
+    level = {"kind": "level", "label": "", "provenance": "model", "y": [1e-6], "text": "reference known to"}
+    figures = [{"id": id, "title": "", "caption": "", "panels": [
+        {"title": "", "x": {"quantity": quantity, "unit": "s", "logarithmic": True}, **axes, "series": [trail, level]}]}
+        for id, quantity in (("wall", "wall time of a step"), ("counts", "evaluations"))]
+    (folder / "trails.json").write_text(json.dumps({"figures": figures}))
+    subprocess.run([sys.executable, SCRIPT, folder / "trails.json", folder / "trails"], check=True)
+    for id, wanted in (("wall", "wall times measured on one machine"), ("counts", "work counted")):
+        words = {e.text: e for e in tree.parse(folder / f"trails/{id}.svg").iter() if e.tag.endswith("}text")}
+        if not any((text or "").endswith(wanted) for text in words):
+            faults.append(f"{id}: no note '{wanted}': {list(words)}")
+        if "end" not in words["reference known to"].get("style", ""):
+            faults.append(f"{id}: the name of the level stands over a point at its left end")
+    return faults
+
+
 def faults_of_layout(drawing):
     """Three panels do not stand side by side, and no text leaves the page: half of 400 pixels is enough for a panel."""
     root = drawing.getroot()
@@ -68,6 +103,11 @@ def faults_of_layout(drawing):
             panels[group.get("id")] = round(float(numbers[1]))
     if len(panels) != 3 or len(set(panels.values())) != 2:
         faults.append(f"three panels do not stand in two columns: left edges {panels}")
+    from drawing_files import text_width
+    for line in (e for e in root.iter() if e.tag.endswith("}text") and "title of a panel" in (e.text or "")):
+        end = float(re.search(r"[(=] ?([0-9.]+)", line.get("transform") or f"={line.get('x')}")[1]) + 72 * text_width(line.text, 9.5)
+        if end > width:
+            faults.append(f"a title ends at {end:.0f} points, the page at {width:.0f}: {line.text}")
     words = [e.text for e in root.iter() if e.tag.endswith("}text")]
     if any(len(w or "") > 110 for w in words) or any("A title" in (w or "") and len(w) > 60 for w in words):
         faults.append(f"a text is not wrapped: {words}")
@@ -116,7 +156,7 @@ def main():
         subprocess.run([sys.executable, SCRIPT, folder / "figures.json", folder / "pdf", "--pdf"], check=True)
         if {f.name for f in (folder / "pdf").iterdir()} != {f"{id}.{ending}" for id in "abcd" for ending in ("svg", "pdf")}:
             faults.append(f"--pdf wrote {sorted(f.name for f in (folder / 'pdf').iterdir())}")
-        faults += faults_of_layout(tree.parse(folder / "x/d.svg"))
+        faults += faults_of_layout(tree.parse(folder / "x/d.svg")) + faults_of_trails(folder)
     for fault in faults:
         print(fault)
     print(f"{len(faults)} faults")

@@ -59,8 +59,7 @@ std::vector<Figure> stability_figures(const StabilityStudy& study) {
           fmt::format("{}_{}", step_rule_name(entry.meaning), pair.name),
           fmt::format("{}: where it fails", step_rule_name(entry.meaning)),
           fmt::format(
-              "Left: {}. Right: {}. Runs of 300 steps (with a rising load: 300 after it), compared "
-              "over "
+              "(a) {}. (b) {}. Runs of 300 steps (with a rising load: 300 after it), compared over "
               "the last 32.{}",
               first->problem, second->problem,
               limited ? "" : " Linear theory gives this rule no limit here.")};

@@ -128,8 +128,8 @@ Figure relaxation_figure(const PaperFigureData& data) {
   };
   return {"figure_07",
           "Figure 7. Relaxation at 4 mm, ramp of 4 mm/s, 30 s",
-          fmt::format("Left: as the paper states its parameters, τ = {:.3g} ms, so the force has "
-                      "relaxed before the ramp ends. Right: fitted to the relaxation tables "
+          fmt::format("(a) As the paper states its parameters, τ = {:.3g} ms, so the force has "
+                      "relaxed before the ramp ends. (b) Fitted to the relaxation tables "
                       "({}). The paper prints two numbers for this depth; which ramp rate they "
                       "come from is not stated.",
                       data.paper.relaxation_time_s() * 1e3, data.fitted_as),
