@@ -3,7 +3,8 @@
 
     draw_deformation.py PICTURES.json FOLDER
 
-undeformed, deformed, displacement, force, validity: from the front, from the side, and a slice through the
+undeformed, deformed, displacement, force, validity: from the front, from the side (from above where a punch would
+hide the organ), and a slice through the
 contact, enlarged; side_by_side if there are two states (TPM and MSM). Displacements are never magnified.
 The same input gives the same bytes.
 """
@@ -34,6 +35,7 @@ FORCE_MAP = LinearSegmentedColormap.from_list("force", ["#08306B", "#4292C6", "#
 DEFORMED_MARGIN = 0.6  # radii around deformed spheres, which are drawn at half their size
 SLICE_HALF_WIDTH = 9.0  # radii to each side of the contact
 SLICE_THICKNESS = 1.1  # spheres nearer to the plane than this many radii are in it
+FROM_ABOVE = (0, 2, 1, 1, "From above", "to the patient's right, x", "Seen along -y", "x")  # as net.VIEWS
 REST, INSIDE = "#9A9A9A", "#D9D9D9"
 FLAGS = [(1, "#F0A83C", "indented by more than 10 mm (paper's validity)"),
          (2, "#C8321E", "by more than 12 mm (damage)"),
@@ -110,7 +112,8 @@ def finish_axes(axes, low, high, view, liver, title):
     axes.set_aspect("equal")
     axes.set_title(title or (name if liver else plain_name), loc="left")
     axes.set_xlabel(f"{across_words if liver else plain_words} [mm]")
-    axes.set_ylabel(f"{'up, y' if liver else 'y'} [mm]")
+    up = "xyz"[view[1]]
+    axes.set_ylabel(f"{'up, y' if liver and up == 'y' else up} [mm]")
 
 
 def frame_of(picture, view):
@@ -165,6 +168,13 @@ def draw_view(axes, picture, position_m, tools, colouring, view, title=None):
     low, high = frame_of(picture, view)
     scale_bar(axes, low, high)
     finish_axes(axes, low, high, view, picture["liver"], title)
+
+
+def views_of(picture):
+    """From the front and from the side; from above where a punch seen from the side would hide what it presses."""
+    front, side = net.VIEWS
+    covered = any(tool["kind"] == "punch" and abs(tool["direction"][side[2]]) > 0.8 for tool in picture["tools"])
+    return front, FROM_ABOVE if covered else side
 
 
 def slice_view(picture):
@@ -266,12 +276,12 @@ def size_of(frame):
 
 def draw_one(picture, position_m, tools, colouring, words):
     page, axes = plt.subplots(1, 3)
-    front, side = net.VIEWS
-    for one, view in zip(axes, (front, side)):
+    views = views_of(picture)
+    for one, view in zip(axes, views):
         draw_view(one, picture, position_m, tools, colouring, view)
     cut = slice_view(picture)
     draw_slice(axes[2], picture, position_m, tools, colouring, cut, "Slice through the contact")
-    whole, enlarged = [size_of(frame_of(picture, view)) for view in (front, side)], size_of(slice_frame(picture, cut))
+    whole, enlarged = [size_of(frame_of(picture, view)) for view in views], size_of(slice_frame(picture, cut))
     sizes = [*whole, enlarged * min(whole[0] / enlarged)]  # as high or as wide as the view from the front
     decorate(page, axes, sizes, picture, colouring, words)
     return page

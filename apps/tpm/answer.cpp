@@ -70,4 +70,11 @@ std::string answer_text(const Session& session, Json result, const std::vector<V
   return to_text(answer);
 }
 
+void add_end(Json& result, const fs::path& folder, const std::vector<std::string>& files,
+             const std::string& next) {
+  result["files"] =
+      array_json(files, [&](const std::string& name) { return (folder / name).string(); });
+  result["next"] = next.empty() ? Json(nullptr) : Json(next);
+}
+
 }  // namespace tpm::app

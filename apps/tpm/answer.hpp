@@ -1,4 +1,5 @@
 #pragma once
+#include <filesystem>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -20,5 +21,11 @@ struct Verdict {
 ///               remarks_json(); no other member has a name of the envelope
 [[nodiscard]] std::string answer_text(const Session& session, Json result,
                                       const std::vector<Verdict>& verdicts = {});
+
+/// Adds to a result what ends its text (end_answer()): `files`, those that were written, and
+/// `next`, the command to type next; null if there is none.
+/// @param folder the files are in; may be empty
+void add_end(Json& result, const std::filesystem::path& folder,
+             const std::vector<std::string>& files, const std::string& next);
 
 }  // namespace tpm::app

@@ -105,7 +105,9 @@ int run_budget(const BudgetCommand& command, const Session& session) {
   if (!command.folder.empty()) files = write_budget_report(command.folder, budget);
   std::string text;
   if (session.json()) {
-    text = answer_text(session, to_json(budget));
+    Json json = to_json(budget);
+    add_end(json, command.folder, files, next_of_budget(command));
+    text = answer_text(session, std::move(json));
   } else if (command.verbose) {
     text = to_terminal_text(budget);
     if (!files.empty()) text += written(session, command.folder, files);

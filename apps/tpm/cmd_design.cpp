@@ -37,20 +37,23 @@ int rank_candidates(const DesignOptions& options, const Session& session) {
   const DesignCheck* checked = check ? &*check : nullptr;
   std::vector<std::string> files;
   if (!options.folder.empty()) files = write_figures(options.folder, design_figures(result));
-  const Json json = to_json(result, checked, top);
+  Json json = to_json(result, checked, top);
+  const std::string csv_text = json_table_csv(json.at("ranked"), "/expected/parameters");
+  constexpr const char* kNext = "tpm fit RECORDING.csv";
   std::string text;
   if (session.json()) {
-    text = answer_text(session, json);
+    add_end(json, options.folder, files, kNext);
+    text = answer_text(session, std::move(json));
   } else if (options.verbose) {
     text = to_terminal_text(result, checked, top);
     if (!files.empty()) text += written(session, options.folder, files);
   } else {
     ShortAnswer answer = short_answer(result, checked, top);
-    end_answer(answer, options.folder, files, "tpm fit RECORDING.csv");
+    end_answer(answer, options.folder, files, kNext);
     text = to_text(answer);
   }
   deliver(text, options.output);
-  deliver_csv(json_table_csv(json.at("ranked"), "/expected/parameters"), csv);
+  deliver_csv(csv_text, csv);
   return 0;
 }
 

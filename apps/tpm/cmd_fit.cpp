@@ -107,9 +107,8 @@ int fit_configuration(const FitOptions& options, const Session& session) {
   if (!options.no_draw)
     will_write_into(options.folder, {"figures.json", "law.json", "answer.json", "fit.html"});
   const FitResult result = fit_and_judge(configured(options));
-  std::string text =
-      session.json() ? answer_text(session, to_json(result)) : to_terminal_text(result);
-  if (!session.json() && result.adequacy) text = result.adequacy->summary + "\n\n" + text;
+  std::string text = to_terminal_text(result);
+  if (result.adequacy) text = result.adequacy->summary + "\n\n" + text;
   std::vector<std::string> files;
   if (!options.folder.empty() && !options.no_draw) {
     files = write_fit_report(options.folder, result);
@@ -117,7 +116,8 @@ int fit_configuration(const FitOptions& options, const Session& session) {
   }
   const std::string& config = options.recordings.files.front();
   text = answer_with_files(
-      options, session, std::move(text), short_answer(result), options.folder, files,
+      options, session, to_json(result), std::move(text), short_answer(result), options.folder,
+      files,
       files.empty() ? fmt::format("tpm fit {} --folder {}_fit", shell_word(config),
                                   shell_word(std::filesystem::path(config).stem().string()))
                     : next_of_law(options.folder, files));
@@ -149,7 +149,8 @@ int fit_recordings(const FitOptions& options, const std::vector<PreparedRecordin
     for (const std::string& words : r.phases.summary) text += fmt::format("{}\n", words);
   }
   text += fmt::format("\n{}\n{}", to_terminal_text(selection), to_terminal_text(best));
-  text = with_moduli(to_json(selection), std::move(text), moduli, session);
+  Json json = to_json(selection);
+  append_moduli(json, text, moduli);
   const std::string folder = figure_folder(options, recordings.front().name);
   std::vector<std::string> files;
   if (!options.no_draw) {
@@ -161,8 +162,8 @@ int fit_recordings(const FitOptions& options, const std::vector<PreparedRecordin
     if (!r.read_as.empty()) answer.conclusion.insert(answer.conclusion.begin(), r.read_as);
   }
   if (moduli) add_moduli(answer, *moduli);
-  text = answer_with_files(options, session, std::move(text), std::move(answer), folder, files,
-                           next_of_law(folder, files));
+  text = answer_with_files(options, session, std::move(json), std::move(text), std::move(answer),
+                           folder, files, next_of_law(folder, files));
   deliver(text, options.output);
   deliver_csv(parameters_csv(best), csv);
   return 0;
@@ -177,18 +178,16 @@ int fit_function(const FitOptions& options, const MaterialFunction& function,
   const Selection selection = select_law(function, selection_options(options));
   const FitResult& best = selection.candidates[selection.recommended].fit;
   std::string text =
-      session.json()
-          ? answer_text(session, to_json(selection))
-          : fmt::format("{}{}{}\n{}", function.read_as, function.read_as.empty() ? "" : "\n",
-                        to_terminal_text(selection), to_terminal_text(best));
+      fmt::format("{}{}{}\n{}", function.read_as, function.read_as.empty() ? "" : "\n",
+                  to_terminal_text(selection), to_terminal_text(best));
   const std::string folder = figure_folder(options, function.name);
   std::vector<std::string> files;
   if (!options.no_draw) files = write_function_report(folder, function, selection);
   ShortAnswer answer = short_answer(selection);
   if (!function.read_as.empty())
     answer.conclusion.insert(answer.conclusion.begin(), function.read_as);
-  text = answer_with_files(options, session, std::move(text), std::move(answer), folder, files,
-                           next_of_law(folder, files));
+  text = answer_with_files(options, session, to_json(selection), std::move(text), std::move(answer),
+                           folder, files, next_of_law(folder, files));
   deliver(text, options.output);
   deliver_csv(parameters_csv(best), csv);
   return 0;

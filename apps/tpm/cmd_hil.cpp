@@ -304,15 +304,17 @@ int run_hil(const RunChoice& choice, const Session& session) {
     return InterruptWatch::exit_code();
   }
   guide.reset();
+  const std::string next = run.outcome.cause == StopCause::finished
+                               ? "tpm hil verify " + shell_word(choice.output)
+                               : std::string();
   if (session.json()) {
     Json json = run_json(hil, run);
     json["recording"] = choice.output;
-    say("{}", answer_text(session, json));
+    add_end(json, {}, {choice.output}, next);
+    say("{}", answer_text(session, std::move(json)));
   } else {
     say("{}wrote {}\n", run_text(hil, run), choice.output);
-    if (run.outcome.cause == StopCause::finished) {
-      say("next: tpm hil verify {}\n", shell_word(choice.output));
-    }
+    if (!next.empty()) say("next: {}\n", next);
   }
   for (const Remark& remark : run.rendering.remarks) {
     tell_user("tpm: warning: {}\n", remark.text);

@@ -42,18 +42,27 @@ VerifyOptions options_of(const VerifyChoice& choice) {
   return options;
 }
 
+/// The verification as JSON, with what ends its text.
+std::string answer_of(const HilRecording& recording, const Verification& v, const Session& session,
+                      const std::string& folder, const std::vector<std::string>& files,
+                      const std::string& next) {
+  Json json = verification_json(recording, v);
+  add_end(json, folder, files, next);
+  return answer_text(session, std::move(json), {{"recording_whole", recording.whole()}});
+}
+
 int verify_hil(const VerifyChoice& choice, const Session& session) {
   const HilRecording recording = read_recording(choice.recording);
   const Verification v = verify(recording, options_of(choice));
+  const std::string next =
+      fmt::format("tpm hil report {} --folder hil_report", shell_word(choice.recording));
   if (session.json()) {
-    say("{}", answer_text(session, verification_json(recording, v),
-                          {{"recording_whole", recording.whole()}}));
+    say("{}", answer_of(recording, v, session, {}, {}, next));
   } else if (choice.verbose) {
     say("{}", verification_text(recording, v));
   } else {
     ShortAnswer answer = short_answer(recording, v);
-    end_answer(answer, "", {},
-               fmt::format("tpm hil report {} --folder hil_report", shell_word(choice.recording)));
+    end_answer(answer, "", {}, next);
     say("{}", to_text(answer));
   }
   // The rest of a damaged or truncated recording is verified, and the answer is still no. The
@@ -68,14 +77,14 @@ int report_hil(const VerifyChoice& choice, const Session& session) {
   const HilRecording recording = read_recording(choice.recording);
   const Verification v = verify(recording, options_of(choice));
   write_hil_report(recording, v, choice.output, python);
+  std::vector<std::string> files{"report.html", "report.md", "report.json", "figures.json"};
+  if (!python.empty()) files.emplace_back("figures");  // else none were drawn
+  const std::string next = "tpm view " + shell_word(choice.recording);
   if (session.json()) {
-    say("{}", answer_text(session, verification_json(recording, v),
-                          {{"recording_whole", recording.whole()}}));
+    say("{}", answer_of(recording, v, session, choice.output, files, next));
   } else {
-    std::vector<std::string> files{"report.html", "report.md", "report.json", "figures.json"};
-    if (!python.empty()) files.emplace_back("figures");  // else none were drawn
     ShortAnswer answer = short_answer(recording, v);
-    end_answer(answer, choice.output, files, "tpm view " + shell_word(choice.recording));
+    end_answer(answer, choice.output, files, next);
     say("{}", choice.verbose
                   ? verification_text(recording, v) + written(session, choice.output, files)
                   : to_text(answer));

@@ -73,7 +73,9 @@ int run_identify(const IdentifyCommand& command, const Session& session) {
     files = write_identification_report(command.folder, id, identified_law(id, recording), json);
   }
   if (session.json()) {
-    text = answer_text(session, json);
+    Json ended = json;
+    add_end(ended, command.folder, files, next_of_identify(command, drive));
+    text = answer_text(session, std::move(ended));
   } else if (!command.verbose) {
     end_answer(answer, command.folder, files, next_of_identify(command, drive));
     text = to_text(answer);

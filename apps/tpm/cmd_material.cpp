@@ -85,11 +85,17 @@ int run_material(const MaterialCommand& command, const Session& session) {
                    std::filesystem::path(command.scene).parent_path(), material_options(command));
   result.samples_sha256 = sample_digests(read_json(command.law));
   if (!command.output.empty()) deliver(to_text(result.scene), command.output);
-  std::string text =
-      session.json() ? answer_text(session, to_json(result)) : to_terminal_text(result);
-  if (!command.folder.empty()) {
-    text += written(session, command.folder, write_organ_material_report(command.folder, result));
+  std::vector<std::string> files;
+  if (!command.folder.empty()) files = write_organ_material_report(command.folder, result);
+  if (session.json()) {
+    Json json = to_json(result);
+    add_end(json, command.folder, files, {});
+    if (!command.output.empty()) json["files"].push_back(command.output);
+    write_output(answer_text(session, std::move(json)));
+    return 0;
   }
+  std::string text = to_terminal_text(result);
+  if (!files.empty()) text += written(session, command.folder, files);
   write_output(text);
   return 0;
 }

@@ -219,6 +219,12 @@ std::string next_of_plan(const PlanCommand& command, const Plan& plan) {
   return fmt::format("tpm simulate {} --planned{} -o planned.h5", scene, options);
 }
 
+/// --write-scene, if a number of spheres was asked for.
+std::vector<std::string> written_scenes(const PlanCommand& command, const PlannedScene& chosen) {
+  if (!chosen.spheres || command.scene_output.empty()) return {};
+  return {command.scene_output};
+}
+
 /// The answer, with the number of spheres before it if that was asked for.
 std::string answer_of_plan(const PlanCommand& command, const PlannedScene& chosen,
                            const Plan& plan) {
@@ -229,8 +235,9 @@ std::string answer_of_plan(const PlanCommand& command, const PlannedScene& chose
   if (chosen.spheres) {
     answer.conclusion.insert(answer.conclusion.begin(), spheres_words(*chosen.spheres));
   }
-  const bool wrote = chosen.spheres && !command.scene_output.empty();
-  if (wrote) answer.end.push_back("wrote " + command.scene_output);
+  for (const std::string& file : written_scenes(command, chosen)) {
+    answer.end.push_back("wrote " + file);
+  }
   end_answer(answer, "", {}, next_of_plan(command, plan));
   return to_text(answer);
 }
@@ -262,6 +269,7 @@ int run_plan(const PlanCommand& command, const Session& session) {
   const Plan plan = planned(*chosen.scene, std::move(request));
   Json json = plan_json(plan);
   if (chosen.spheres) json["spheres_choice"] = spheres_json(*chosen.spheres);
+  add_end(json, {}, written_scenes(command, chosen), next_of_plan(command, plan));
   deliver(session.json() ? answer_text(session, json, {{"model_found", plan.choice.has_value()}})
                          : answer_of_plan(command, chosen, plan),
           command.output);

@@ -211,6 +211,10 @@ std::vector<std::string> write_all(const SimulateChoice& choice,
   return files;
 }
 
+std::string next_of_run(const SimulateChoice& choice) {
+  return "tpm view " + shell_word(choice.output);
+}
+
 /// Runs a scene by a formulation that does not show whole states: the response, and displacements
 /// where they are known.
 int simulate_trajectory(const SimulateChoice& choice, const ExperimentScene& scene,
@@ -227,7 +231,7 @@ int simulate_trajectory(const SimulateChoice& choice, const ExperimentScene& sce
   const Trajectory answer = run_scene(scene, times, scene.formulation.entry().can().field);
   write_scene_run(scene, times, answer, choice.output);
   say_with_files(session, with_spacing_law(scene_run_json(scene, times, answer), scene),
-                 scene_run_text(scene, times, answer), {choice.output});
+                 scene_run_text(scene, times, answer), {choice.output}, {});
   tell_spacing_law(scene, session);
   return 0;
 }
@@ -276,12 +280,13 @@ int simulate_and_report(const SimulateChoice& choice, const Session& session) {
     }
   }
   if (session.json() || choice.verbose) {
-    say_with_files(session, with_spacing_law(std::move(json), all.front().scene), text, files);
+    say_with_files(session, with_spacing_law(std::move(json), all.front().scene), text, files,
+                   next_of_run(choice));
     tell_spacing_law(all.front().scene, session);
     return 0;
   }
   answer.end.push_back(fmt::format("wrote {}", fmt::join(files, ", ")));
-  end_answer(answer, "", {}, "tpm view " + shell_word(choice.output));
+  end_answer(answer, "", {}, next_of_run(choice));
   say("{}", to_text(answer));
   tell_spacing_law(all.front().scene, session);
   return 0;
@@ -315,13 +320,14 @@ int simulate_planned(const SimulateChoice& choice, const Session& session) {
   if (session.json() || choice.verbose) {
     // Verbose: also which candidates were considered, and what the plan says of them.
     say_with_files(session, with_spacing_law(planned_run_json(plan, scene, times, answer), scene),
-                   plan_text(plan) + "\n" + planned_run_text(plan, times, answer), {choice.output});
+                   plan_text(plan) + "\n" + planned_run_text(plan, times, answer), {choice.output},
+                   next_of_run(choice));
     tell_spacing_law(scene, session);
     return 0;
   }
   ShortAnswer brief = short_answer(plan, times, answer);
   brief.end.push_back(fmt::format("wrote {}", choice.output));
-  end_answer(brief, "", {}, "tpm view " + shell_word(choice.output));
+  end_answer(brief, "", {}, next_of_run(choice));
   say("{}", to_text(brief));
   tell_spacing_law(scene, session);
   return 0;

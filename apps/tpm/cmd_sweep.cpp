@@ -134,8 +134,8 @@ int print_results(const Sweep& sweep, const CellTally& tally, const std::vector<
   if (tally.reasons.size() > kShown) {
     text += fmt::format("- and {} more reasons: /reasons\n", tally.reasons.size() - kShown);
   }
-  say_with_files(session, tally_json(sweep, tally), text, files);
-  if (!session.json()) say("next: {}\n", next_of_sweep(tally, files.front()));
+  say_with_files(session, tally_json(sweep, tally), text, files,
+                 next_of_sweep(tally, files.front()));
   return exit_code(tally.done > 0 || tally.failed == 0);
 }
 

@@ -356,6 +356,27 @@ std::string next_of_validation(const ValidateOptions& options, const Validation&
              : fmt::format("tpm budget {} {}", subject, compared);
 }
 
+std::string validation_text(const ValidateOptions& options, const Session& session,
+                            const Validation& validation, const std::vector<std::string>& files) {
+  std::string text = to_terminal_text(validation);
+  if (!options.folder.empty()) text += written(session, options.folder, files);
+  if (!options.credibility.empty()) text += fmt::format("written: {}\n", options.credibility);
+  return text + fmt::format("next: {}\n", next_of_validation(options, validation));
+}
+
+std::string validation_json(const ValidateOptions& options, const Session& session,
+                            const Validation& validation, const std::vector<std::string>& files) {
+  Json json = to_json(validation);
+  add_end(json, options.folder, files, next_of_validation(options, validation));
+  if (!options.credibility.empty()) json["files"].push_back(options.credibility);
+  // Where nothing is required, nothing is tested.
+  std::vector<Verdict> verdicts;
+  if (!validation.requirement.empty()) {
+    verdicts.push_back({"model_adequate", validation.answers_yes()});
+  }
+  return answer_text(session, std::move(json), verdicts);
+}
+
 int run_validate(const ValidateOptions& options, const Session& session) {
   if (!options.recheck.empty()) {
     if (!options.law.empty() || !options.credibility.empty() || !options.folder.empty()) {
@@ -376,25 +397,18 @@ int run_validate(const ValidateOptions& options, const Session& session) {
   (void)evidence_of(options);
   const ValidationRequest request = validation_request(options);
   const Validation validation = validate(request);
-  std::string text = session.json() ? answer_text(session, to_json(validation),
-                                                  {{"model_adequate", validation.answers_yes()}})
-                                    : to_terminal_text(validation);
   std::string page;
   if (!options.credibility.empty()) {
     page = credibility_page(record_of(options, request, validation));
   }
+  std::vector<std::string> files;
   if (!options.folder.empty()) {
-    text += written(session, options.folder,
-                    write_validation_report(options.folder, request, validation));
+    files = write_validation_report(options.folder, request, validation);
   }
-  if (!options.credibility.empty()) {
-    write_file(options.credibility, page);
-    if (!session.json()) text += fmt::format("written: {}\n", options.credibility);
-  }
-  if (!session.json()) {
-    text += fmt::format("next: {}\n", next_of_validation(options, validation));
-  }
-  deliver(text, options.output);
+  if (!options.credibility.empty()) write_file(options.credibility, page);
+  deliver(session.json() ? validation_json(options, session, validation, files)
+                         : validation_text(options, session, validation, files),
+          options.output);
   deliver_csv(to_csv(validation), csv);
   return exit_code(validation.answers_yes());
 }

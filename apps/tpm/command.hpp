@@ -143,9 +143,11 @@ void tell_user(fmt::format_string<Arguments...> text, Arguments&&... arguments) 
   write_message(fmt::format(text, std::forward<Arguments>(arguments)...));
 }
 
-/// Prints an answer and the files that were written, which JSON has under "files".
+/// Prints an answer, the files that were written and the command to type next, which JSON has under
+/// "files" and "next".
+/// @param next may be empty
 void say_with_files(const Session& session, Json json, std::string_view text,
-                    const std::vector<std::string>& files);
+                    const std::vector<std::string>& files, const std::string& next);
 
 // One function per file cmd_*.cpp.
 void add_schema_command(CLI::App& app, Session& session);

@@ -113,13 +113,17 @@ std::vector<std::string> with_option(const CLI::App& command, const std::string&
 }
 
 /// Commands that have this option: those that stand nearest to this one. None if there are more
-/// than three, of which most do something else.
+/// than three, of which most do something else. What a command of a group (`tpm network build`)
+/// finds outside of the group counts only if it is the only one.
 std::vector<std::string> elsewhere(const CLI::App& command, const std::string& name) {
   constexpr std::size_t kMost = 3;
   if (!name.starts_with("--")) return {};
+  const CLI::App* const group = command.get_parent();
+  const bool of_a_group = group != nullptr && group->get_parent() != nullptr;
   for (const CLI::App* app = &command; app != nullptr; app = app->get_parent()) {
-    std::vector<std::string> found = with_option(*app, name);
-    if (found.size() > kMost) return {};
+    const std::vector<std::string> found = with_option(*app, name);
+    const bool outside = of_a_group && app->get_parent() == nullptr;
+    if (found.size() > (outside ? 1 : kMost)) return {};
     if (!found.empty()) return found;
   }
   return {};

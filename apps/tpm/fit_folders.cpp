@@ -135,7 +135,9 @@ int fit_folder(const FitOptions& options, const Session& session) {
   if (const auto probe = probe_of(options)) {
     moduli = pooled_moduli(study, *probe, options.poisson.empty());
   }
-  std::string text = with_moduli(to_json(study), to_terminal_text(study), moduli, session);
+  Json json = to_json(study);
+  std::string text = to_terminal_text(study);
+  append_moduli(json, text, moduli);
   const std::string folder = figure_folder(options, options.recordings.files.front());
   std::vector<std::string> files;
   if (!options.no_draw) {
@@ -144,8 +146,8 @@ int fit_folder(const FitOptions& options, const Session& session) {
   }
   ShortAnswer answer = short_answer(study);
   if (moduli) add_moduli(answer, *moduli);
-  text = answer_with_files(options, session, std::move(text), std::move(answer), folder, files,
-                           files.empty() ? "" : next_of_figures(folder));
+  text = answer_with_files(options, session, std::move(json), std::move(text), std::move(answer),
+                           folder, files, files.empty() ? "" : next_of_figures(folder));
   deliver(text, options.output);
   deliver_csv(pooled_csv(study), csv);
   return 0;
@@ -175,12 +177,11 @@ int compare_folders(const FitOptions& options, const Session& session) {
                  selection.setup.zero);
   const std::optional<ContactGeometry> probe = probe_of(options);
   const GroupComparison comparison = compare_groups(first, second, law, selection, probe);
-  std::string text =
-      session.json() ? answer_text(session, to_json(comparison)) : to_terminal_text(comparison);
   std::vector<std::string> files;
   if (!options.no_draw) files = write_comparison_report(folder, comparison, probe);
-  text = answer_with_files(options, session, std::move(text), short_answer(comparison), folder,
-                           files, files.empty() ? "" : next_of_figures(folder));
+  const std::string text = answer_with_files(
+      options, session, to_json(comparison), to_terminal_text(comparison), short_answer(comparison),
+      folder, files, files.empty() ? "" : next_of_figures(folder));
   deliver(text, options.output);
   deliver_csv(comparison_csv(comparison), csv);
   return 0;

@@ -115,19 +115,19 @@ void write_moduli(const std::filesystem::path& folder, const std::optional<Young
   files.insert(files.end(), {"young_moduli.json", "young_moduli.csv"});
 }
 
-std::string with_moduli(Json json, std::string text, const std::optional<YoungModuli>& moduli,
-                        const Session& session) {
-  if (moduli) {
-    json["young_moduli"] = to_json(*moduli);
-    text += "\n" + to_terminal_text(*moduli);
-  }
-  return session.json() ? answer_text(session, json) : text;
+void append_moduli(Json& json, std::string& text, const std::optional<YoungModuli>& moduli) {
+  if (!moduli) return;
+  json["young_moduli"] = to_json(*moduli);
+  text += "\n" + to_terminal_text(*moduli);
 }
 
-std::string answer_with_files(const FitOptions& options, const Session& session, std::string text,
-                              ShortAnswer answer, const std::string& folder,
+std::string answer_with_files(const FitOptions& options, const Session& session, Json json,
+                              std::string text, ShortAnswer answer, const std::string& folder,
                               const std::vector<std::string>& files, const std::string& next) {
-  if (session.json()) return text;
+  if (session.json()) {
+    add_end(json, folder, files, next);
+    return answer_text(session, std::move(json));
+  }
   if (options.verbose) return files.empty() ? text : text + written(session, folder, files);
   end_answer(answer, folder, files, next);
   return to_text(answer);

@@ -64,14 +64,12 @@ void announce_figures(const FitOptions& options, const std::string& input,
 void write_moduli(const std::filesystem::path& folder, const std::optional<YoungModuli>& moduli,
                   std::vector<std::string>& files);
 
-/// The answer to recordings, with the moduli if there are any.
-[[nodiscard]] std::string with_moduli(Json json, std::string text,
-                                      const std::optional<YoungModuli>& moduli,
-                                      const Session& session);
+/// Appends the moduli, if there are any, to the answer in both forms.
+void append_moduli(Json& json, std::string& text, const std::optional<YoungModuli>& moduli);
 
-/// The text of the answer: the short one, or with --verbose `text`, with the files below.
+/// The answer: as JSON, the short text, or with --verbose `text`; each with the files at its end.
 [[nodiscard]] std::string answer_with_files(const FitOptions& options, const Session& session,
-                                            std::string text, ShortAnswer answer,
+                                            Json json, std::string text, ShortAnswer answer,
                                             const std::string& folder,
                                             const std::vector<std::string>& files,
                                             const std::string& next);

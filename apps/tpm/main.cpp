@@ -121,10 +121,11 @@ std::string written(const Session& session, const std::string& folder,
 }
 
 void say_with_files(const Session& session, Json json, std::string_view text,
-                    const std::vector<std::string>& files) {
-  json["files"] = files;
-  write_output(session.json() ? answer_text(session, std::move(json))
-                              : fmt::format("{}wrote {}\n", text, fmt::join(files, ", ")));
+                    const std::vector<std::string>& files, const std::string& next) {
+  add_end(json, {}, files, next);
+  if (session.json()) return write_output(answer_text(session, std::move(json)));
+  write_output(fmt::format("{}wrote {}\n{}", text, fmt::join(files, ", "),
+                           next.empty() ? std::string() : fmt::format("next: {}\n", next)));
 }
 
 void will_write_into(const std::filesystem::path& folder, std::initializer_list<const char*> names,

@@ -125,6 +125,9 @@ TEST_CASE("a wrong word is named, with the nearest right one and the help to rea
         "tpm hil verify --help");
   check("paper tables --bootstrap 5", "paper tables: no option '--bootstrap'",
         "did you mean 'tpm fit --bootstrap'", "tpm paper tables --help");
+  // Two commands of another group are about something else.
+  check("network build --list", "tpm: network build: no option", "'--list'; see",
+        "tpm network build --help");
   // A command that replaces what it was told to write needs no other one's permission.
   check("network build --overwrite -o x.h5", "network build: no option '--overwrite'",
         "the file that -o names is replaced without it", "tpm network build --help");

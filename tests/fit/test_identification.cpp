@@ -323,6 +323,13 @@ TEST_CASE("laws that are identified are handed to the loop") {
     CHECK(*h.done_s >= h.asked_s);
     CHECK(h.decision.energy_after_J <= h.decision.energy_before_J);
   }
+  const files::Json list = to_json(loop)["hand_overs"];
+  REQUIRE(list.size() == loop.hand_overs.size());
+  for (std::size_t i = 0; i < list.size(); ++i) {
+    const bool last = i + 1 == list.size();
+    const char* const waiting = last ? "waits" : "replaced";
+    CHECK(list[i]["state"] == (loop.hand_overs[i].done_s ? "done" : waiting));
+  }
 }
 
 }  // namespace tpm::fit

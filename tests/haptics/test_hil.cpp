@@ -358,6 +358,19 @@ TEST_CASE("Every output of a simulated device says so") {
   CHECK(verification_json(recording, v).at("simulated_device") == true);
 }
 
+TEST_CASE("The errors of each kind of phase, which the text tables, are in the JSON of a session") {
+  const HilRecording made = recorded(test::TempFolder());
+  const files::Json json = verification_json(made, verify(made));
+  std::size_t counted = 0;
+  double most_N = 0.0;
+  for (const files::Json& kind : json.at("kinds")) {
+    counted += kind.at("count").get<std::size_t>();
+    most_N = std::max(most_N, kind.at("max_N").get<double>());
+  }
+  CHECK(std::pair(counted, most_N) ==
+        std::pair(json.at("phases").size(), json.at("all").at("max_N").get<double>()));
+}
+
 TEST_CASE("An exported recording holds every column of every row, with unit, and what made it") {
   const test::TempFolder folder;
   const HilRecording recording = recorded(folder);

@@ -2,6 +2,7 @@
 #include <fmt/format.h>
 #include <sys/wait.h>
 
+#include <algorithm>
 #include <catch2/catch.hpp>
 #include <cstdlib>
 #include <fstream>
@@ -158,6 +159,21 @@ TEST_CASE("every key of the JSON answer is described in docs/data_formats.md", "
     CAPTURE(key);
     CHECK(page.find("`" + key + "`") != std::string::npos);
   }
+}
+
+TEST_CASE("the JSON says how deep tools come into spheres, which the text says") {
+  const std::string protocol =
+      R"("protocol": {"kind": "ramp_hold", "depth": "3 mm", "rate": "4 mm/s", "hold": "1 s"})";
+  const ExperimentScene bare = small_scene(protocol);
+  CHECK(simulation_json(bare, network_to_run(bare), run_of(bare))["largest_overlap_m"].is_null());
+  const ExperimentScene ball =
+      small_scene(R"("contacts": [{"kind": "ball", "radius": "20 mm"}], )" + protocol);
+  const SimulationRun run = run_of(ball);
+  const Json json = simulation_json(ball, network_to_run(ball), run);
+  double most = 0.0;
+  for (const CurvePoint& p : run.record.curve) most = std::max(most, p.overlap_m);
+  REQUIRE(most > 0.0);
+  CHECK_THAT(json["largest_overlap_m"].get<double>(), Catch::Matchers::WithinRel(most, 1e-2));
 }
 
 TEST_CASE("a run that is stopped, by whatever signal, ends as one that was not", "[heavy]") {

@@ -317,6 +317,10 @@ TEST_CASE("of masses that scene and reference leave out there is one number and 
   CHECK(inertia.part == "inertia");
   CHECK(inertia.matters);
   CHECK(*plan.masses_left_out == *inertia.error);
+  // No candidate is left without what the text says against it.
+  for (const Json& candidate : plan_json(plan)["frontier"]) {
+    CHECK(candidate["reason"].is_string());
+  }
   const std::string text = plan_text(plan);
   const std::string words = "inertia matters";
   CHECK(text.find(words) != std::string::npos);

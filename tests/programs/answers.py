@@ -70,6 +70,11 @@ SLOW = {"hil serve", "hil check", "hil identify", "hil stability", "paper experi
 BEGIN, END = "<!-- members: written by tests/programs/answers.py -->", "<!-- end of members -->"
 
 
+# The text of these ends with the files and the command to type next; so does the JSON. Of the quick ones both are compared.
+ENDED = {"budget", "fit", "hil run", "hil verify", "hil report", "identify", "material", "simulate", "validate"}
+QUICK = ("fit recording.csv", "validate ", "budget ", "design CONFIGS/design_liver.json")
+
+
 def with_format(command, path=""):
     if any("--format" in o["names"] for o in command["options"]) and path:
         yield path
@@ -131,6 +136,14 @@ def faults_of(answer, words, folder, exit_code):
     return faults
 
 
+def faults_of_end(answer, text):
+    """Where text and JSON of an answer end otherwise."""
+    if not isinstance(answer.get("files"), list) or "next" not in answer:
+        return ["files or next are missing"]
+    said = re.findall(r"(?:^|; )next: (.*)$", text, re.M)
+    return [f"next is {answer['next']}, the text says {said}"] if said != [answer["next"]] else []
+
+
 def orders_of_shards(program, sweep, folder):
     """Orders of shards in which `sweep merge` writes another result or another answer."""
     names = [f"ordered.h5.shard-{k}-of-3" for k in (1, 2, 3)]
@@ -168,6 +181,11 @@ def main():
                 continue
             answer = json.loads(done.stdout)
             wrong = faults_of(answer, words, folder, done.returncode)
+            if line.startswith(QUICK):
+                done = subprocess.run([program, *words], cwd=folder, capture_output=True, text=True, timeout=300)
+                wrong += faults_of_end(answer, done.stdout)
+            elif answer["command"] in ENDED and not {"files", "next"} <= answer.keys():
+                wrong.append("files or next are missing")
             faults += len(wrong)
             for fault in wrong:
                 print(f"tpm {line}: {fault}")

@@ -36,6 +36,10 @@ def faults_of_views():
         low, high = draw_deformation.frame_of(picture, view)
         if low[1] > -32.5 or high[1] != 15:
             faults.append(f"the frame of '{view[4]}' is {low} to {high} mm; a sphere of half its 5 mm is at -30 mm")
+    plate = {"kind": "punch", "direction": [-1, 0, 0]}
+    for tools, towards in (([], 0), ([{**plate, "direction": [0, 0, 1]}], 0), ([{**plate, "kind": "ball"}], 0), ([plate], 1)):
+        if draw_deformation.views_of({"tools": tools})[1][2] != towards:
+            faults.append(f"tools {tools}: the second view is not along axis {towards}")
     if [k for k in range(20) if draw_network.layer_colour(k) == draw_network.layer_colour(0)] != [0]:
         faults.append("an inner layer has the colour of the outermost")
     return faults

@@ -38,7 +38,8 @@ ValueType<std::string> text(std::size_t fewest) {
 
 ValueType<Remark> remark() {
   static const Block<Remark> block(
-      "remark", "that ended nothing",
+      "remark",
+      "what was assumed or is doubtful, or was not asked for; it leaves the exit code as it is",
       {required(key("code", &Remark::code, text(), "its kind, which stays when the text changes")),
        required(key("text", &Remark::text, text(), "in words, with its numbers"))});
   return block.type();

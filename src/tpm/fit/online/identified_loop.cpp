@@ -128,11 +128,23 @@ IdentifiedLoop replay_in_loop(const Identification& identification,
   return loop.take();
 }
 
+namespace {
+
+/// "done"; "waits": the law would store more energy at equal force; "replaced": it waited until a
+/// better one was known.
+const char* hand_over_state(const IdentifiedLoop& loop, const LoopHandOver& hand_over) {
+  if (hand_over.done_s) return "done";
+  return &hand_over == &loop.hand_overs.back() ? "waits" : "replaced";
+}
+
+}  // namespace
+
 Json to_json(const IdentifiedLoop& loop) {
   Json list = Json::array();
   for (const LoopHandOver& h : loop.hand_overs) {
     list.push_back({{"asked_s", h.asked_s},
                     {"done_s", h.done_s ? Json(*h.done_s) : Json()},
+                    {"state", hand_over_state(loop, h)},
                     {"from", h.from},
                     {"to", h.to},
                     {"widest_relative_half_width", h.widest_relative_half_width},

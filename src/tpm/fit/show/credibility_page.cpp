@@ -197,8 +197,11 @@ class EvidencePage {
   }
 
   void add_validation(Document& d) const {
-    d.paragraph(fmt::format("Requirement: {}. E = S - D, U of 95 %.",
-                            validation_.at("requirement").get<std::string>()));
+    d.paragraph(fmt::format(
+        "Requirement: {}. S: simulated, D: measured, E = S - D: error of the comparison, U: its "
+        "expanded uncertainty (95 %), of the standard uncertainties u_num (numerical), u_input "
+        "(parameters of the law) and u_D (data), R: the largest error that the requirement allows.",
+        validation_.at("requirement").get<std::string>()));
     const Json& recordings = validation_.at("recordings");
     for (std::size_t i = 0; i < recordings.size(); ++i) {
       Table table{fmt::format("{}, SHA-256 {}", recordings[i].at("recording").get<std::string>(),

@@ -16,6 +16,9 @@
 namespace tpm::fit {
 namespace {
 
+/// The law where the recording was not fitted: what it predicts.
+constexpr const char* kOutsideLabel = "fitted law, outside the fitted window";
+
 /// More points than this only make the file heavy.
 constexpr std::size_t kMostDrawn = 4000;
 
@@ -74,10 +77,10 @@ Panel response_panel(const RecordingFit& r, bool over_time) {
   add_if_any(panel, sampled(measured("readings, not fitted", r), r, x, x_unit, r.observed, y_unit,
                             outside));
   if (over_time) add_band(panel, r, y_unit);
-  add_if_any(panel, sampled(line("law", {}, {}), r, x, x_unit, r.predicted, y_unit, inside));
+  add_if_any(panel, sampled(line("fitted law", {}, {}), r, x, x_unit, r.predicted, y_unit, inside));
   if (over_time) {
     add_if_any(panel,
-               sampled(line("law, predicted", {}, {}), r, x, x_unit, r.predicted, y_unit, outside));
+               sampled(line(kOutsideLabel, {}, {}), r, x, x_unit, r.predicted, y_unit, outside));
   }
   return panel;
 }
@@ -117,26 +120,31 @@ FitConfig seen_from(const std::filesystem::path& folder, FitConfig config) {
   return config;
 }
 
+/// What a provenance means to somebody who has not read of it.
+std::string origin_words(Provenance provenance) {
+  if (provenance == Provenance::assumed) return "assumed: chosen or computed, not measured";
+  return std::string(provenance_name(provenance));
+}
+
 /// Where the readings behind a figure come from: "data: meat.csv [measured]".
 std::string data_words(const FitResult& fit) {
   std::vector<std::string> words;
   for (const RecordingFit& r : fit.recordings) {
     words.push_back(fmt::format(
         "{} [{}]", std::filesystem::path(fit.config.data[r.choice].dataset).filename().string(),
-        provenance_name(r.provenance)));
+        origin_words(r.provenance)));
   }
   return words.empty() ? "" : fmt::format("data: {}", fmt::join(words, ", "));
 }
 
 /// Each law's residual and BIC over its number of parameters, the recommended one marked.
 Figure selection_figure(const Selection& selection) {
-  Figure figure{
-      "selection", "Which law",
-      fmt::format(
-          "Every law that was fitted: residual, and BIC above the best with {} effective readings, "
-          "over the number of estimated parameters. The recommended law is {}.",
-          significant(selection.effective_count, 3),
-          law_name(selection.candidates[selection.recommended].law))};
+  Figure figure{"selection", "Which law",
+                fmt::format("Every law that was fitted: residual, and BIC above the best with "
+                            "{:.0f} independent readings, "
+                            "over the number of estimated parameters. The recommended law is {}.",
+                            selection.effective_count,
+                            law_name(selection.candidates[selection.recommended].law))};
   Panel residual;
   residual.x = {"estimated parameters", ""};
   residual.y = {"rms residual over peak", "%", true};

@@ -8,7 +8,7 @@
 
 #include "tpm/base/dense_algebra.hpp"
 #include "tpm/base/enum_names.hpp"
-#include "tpm/base/quantity_text.hpp"
+#include "tpm/base/sized_unit.hpp"
 #include "tpm/base/text.hpp"
 #include "tpm/fit/recording/placement.hpp"
 #include "tpmkit/error.hpp"
@@ -126,11 +126,6 @@ void set_zero(ValidationPlacement& p, const Recording& r, std::size_t count) {
   const auto n = static_cast<Eigen::Index>(count);
   p.zero_by_reading.head(n).setConstant(1.0 / static_cast<double>(count));
   p.zero = Eigen::VectorXd::Map(r.response.data(), n).mean();
-}
-
-std::string length_words(double value, Dimension dimension) {
-  const Unit unit = shown_unit(dimension);
-  return with_unit(significant(value / unit.to_si, 3), unit);
 }
 
 }  // namespace
@@ -266,7 +261,7 @@ class HeldPlacement {
     if (p_.onset) {
       const Dimension d = quantity_dimension(r_.drive_quantity);
       p_.contact_words += fmt::format(" (the onset, {} with u {}, agrees)",
-                                      length_words(*p_.onset, d), length_words(*p_.onset_u, d));
+                                      sized_text(d, *p_.onset, 3), sized_text(d, *p_.onset_u, 3));
     }
     set_zero(p_, r_, parts_.ramp_first + 1);
   }

@@ -200,7 +200,8 @@ const Block<RecordingClosing>& recording_closing_block() {
        unread<C>("clock", clock, "in real time"),
        unread<C>("markers", list_form(marker, 0), "set by the operator"),
        key("device_findings", &C::device_findings, list(remark()),
-           "what the device noticed and that ended nothing; docs/haptics.md lists the codes, a "
+           "what the device noticed and what did not end the session; docs/haptics.md lists the "
+           "codes, a "
            "device of a caller's own may have others")});
   return block;
 }

@@ -114,7 +114,10 @@ std::string on_hardware_text(const std::optional<RenderingCheck>& rendering,
 }
 
 Json on_hardware_json(const std::optional<RenderingCheck>& rendering) {
-  return rendering ? to_json(*rendering) : Json();
+  if (!rendering) return {};
+  Json json = to_json(*rendering);
+  json["accepted"] = rendering->acceptable();
+  return json;
 }
 
 Json session_verdict_json(const SessionVerdict& session) {
@@ -139,8 +142,14 @@ Json fidelity_json(const ForceFidelity& f) {
           {"peak_N", rounded(f.peak_N)}};
 }
 
+/// None of a peak of 0.
+std::optional<double> share_of(double part_N, double peak_N) {
+  return peak_N > 0.0 ? std::optional(part_N / peak_N) : std::nullopt;
+}
+
 std::string share(double part_N, double peak_N) {
-  return peak_N > 0.0 ? significant(100.0 * part_N / peak_N, 3) + " %" : "-";
+  const std::optional<double> part = share_of(part_N, peak_N);
+  return part ? significant(100.0 * *part, 3) + " %" : "-";
 }
 
 /// The errors of all phases of one kind.
@@ -161,6 +170,18 @@ std::map<std::string, PhaseKindErrors> errors_by_kind(const Verification& v) {
     kind.max_N = std::max(kind.max_N, p.force.max_N);
   }
   return kinds;
+}
+
+Json kinds_json(const Verification& v) {
+  Json list = Json::array();
+  for (const auto& [name, kind] : errors_by_kind(v)) {
+    list.push_back({{"kind", name},
+                    {"count", kind.count},
+                    {"rms_N", rounded(kind.rms_N())},
+                    {"max_N", rounded(kind.max_N)},
+                    {"max_over_peak", or_null(share_of(kind.max_N, v.all.peak_N))}});
+  }
+  return list;
 }
 
 /// Time that was verified: of a session that ended early, of how much.
@@ -366,6 +387,7 @@ Json verification_json(const HilRecording& recording, const Verification& v) {
           {"reference_error_N", rounded(v.reference_error_N)},
           {"model_error_N", rounded(v.model_error_N)},
           {"all", fidelity_json(v.all)},
+          {"kinds", kinds_json(v)},
           {"phases", phase_table(v).list(v.phases)},
           {"others", others},
           {"experiment", experiment_table(v).list(v.experiment)}};

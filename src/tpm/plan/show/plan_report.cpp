@@ -30,12 +30,6 @@ std::string time_text(double seconds) {
   return significant(seconds, 3) + " s";
 }
 
-/// Null if there is none.
-template <class Row>
-Json reason_of(const Row& row) {
-  return row.reason.empty() ? Json(nullptr) : Json(row.reason);
-}
-
 ResultTable<PlannedCandidate> frontier(const Plan& plan) {
   using Row = PlannedCandidate;
   using Of = ResultColumn<Row>;
@@ -43,10 +37,18 @@ ResultTable<PlannedCandidate> frontier(const Plan& plan) {
   const auto error = [&plan](std::optional<double> Row::*of) {
     return [&plan, of](const Row& c) { return shown_error(plan, c.*of); };
   };
-  const auto why = [&plan](const Row& c) {
-    return Cell{!c.feasible            ? c.reason
-                : plan.masses_left_out ? "meets both but for masses"
-                                       : "meets both"};
+  // Empty where nothing is to be said against the candidate.
+  const auto against = [&plan](const Row& c) -> std::string {
+    if (!c.feasible) return c.reason;
+    return plan.masses_left_out ? "meets both but for masses" : "";
+  };
+  const auto why = [against](const Row& c) {
+    const std::string words = against(c);
+    return Cell{words.empty() ? "meets both" : words};
+  };
+  const auto reason = [against](const Row& c) {
+    const std::string words = against(c);
+    return words.empty() ? Json(nullptr) : Json(words);
   };
   return {
       {Of("name", &Row::name).shown("candidate", -26),
@@ -60,7 +62,7 @@ ResultTable<PlannedCandidate> frontier(const Plan& plan) {
        {"verified_response_error", error(&Row::verified_response_error)},
        {"accurate", &Row::accurate},
        {"feasible", &Row::feasible},
-       Of("reason", reason_of<Row>).shown("").in_words(why)}};
+       Of("reason", reason).shown("").in_words(why)}};
 }
 
 const ResultTable<TriedSpheres>& tried_spheres() {
@@ -68,6 +70,9 @@ const ResultTable<TriedSpheres>& tried_spheres() {
   using Of = ResultColumn<Row>;
   const auto run = [](const Row& t) { return Cell{t.peak ? time_text(t.operations_s) : "-"}; };
   const auto reason = [](const Row& t) { return Cell{t.reason}; };
+  const auto reason_or_null = [](const Row& t) {
+    return t.reason.empty() ? Json(nullptr) : Json(t.reason);
+  };
   static const ResultTable<Row> table(
       {Of("spheres", [](const Row& t) { return t.filling.spheres; }).shown("spheres", 9),
        Of("spacing_m", &Row::spacing_m).shown("spacing, mm", 11, 1e-3, 3),
@@ -75,7 +80,7 @@ const ResultTable<TriedSpheres>& tried_spheres() {
        Of("peak", &Row::peak).shown("peak", 12, 1.0, 5),
        Of("claimed_error", &Row::claimed_error).shown("claimed", 10).as(share_text),
        Of("run_s", &Row::operations_s).shown("a run", 10).in_words(run),
-       Of("reason", reason_of<Row>).shown("").in_words(reason)});
+       Of("reason", reason_or_null).shown("").in_words(reason)});
   return table;
 }
 

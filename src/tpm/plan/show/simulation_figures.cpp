@@ -77,6 +77,32 @@ Json state_json(const FiguredRun& figured) {
   return json;
 }
 
+std::string contact_name(const FiguredRun& figured, std::size_t sphere) {
+  return fmt::format("{}, contact at sphere {}", name_of(figured), sphere);
+}
+
+/// Contacts that follow protocols of their own, which impose what the scene's does: a second jaw.
+std::vector<Series> beside_series(const FiguredRun& figured, const std::vector<double>& time_s,
+                                  bool imposed) {
+  const ExperimentScene& scene = *figured.scene;
+  const bool by_depth = scene.protocol.drive() == Drive::displacement;
+  const double per_unit = imposed == by_depth ? 1e3 : 1.0;
+  std::vector<Series> series;
+  std::size_t index = 0;
+  for (std::size_t i = 1; i < scene.contacts.size(); ++i) {
+    const SceneContact& contact = scene.contacts[i];
+    if (!contact.protocol) continue;
+    const std::size_t own = index++;
+    if (contact.protocol->drive() != scene.protocol.drive()) continue;
+    std::vector<double> y;
+    for (const CurvePoint& p : figured.run->record.curve) {
+      y.push_back(per_unit * (imposed ? value_at(*contact.protocol, p.time_s) : p.beside[own]));
+    }
+    series.push_back(line(contact_name(figured, contact.probe.sphere + 1), time_s, std::move(y)));
+  }
+  return series;
+}
+
 Panel panel_of(const std::vector<FiguredRun>& runs, bool imposed) {
   const bool by_depth = runs.front().scene->protocol.drive() == Drive::displacement;
   const bool length = imposed == by_depth;
@@ -91,7 +117,11 @@ Panel panel_of(const std::vector<FiguredRun>& runs, bool imposed) {
       x.push_back(p.time_s);
       y.push_back((imposed ? p.imposed : p.response) * (length ? 1e3 : 1.0));
     }
-    panel.series.push_back(line(name_of(figured), std::move(x), std::move(y)));
+    const std::vector<Series> others = beside_series(figured, x, imposed);
+    const std::size_t first = figured.scene->probe().sphere + 1;
+    panel.series.push_back(line(others.empty() ? name_of(figured) : contact_name(figured, first),
+                                std::move(x), std::move(y)));
+    panel.series.insert(panel.series.end(), others.begin(), others.end());
     if (imposed) break;  // the same for all
   }
   return panel;

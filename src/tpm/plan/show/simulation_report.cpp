@@ -130,6 +130,20 @@ std::optional<OwnCourse> own_course(const ExperimentScene& scene, const Simulati
   return course;
 }
 
+/// How deep a tool has come into a sphere, as contacts are stiff and not rigid; none without a
+/// tool.
+std::optional<double> largest_overlap_m(const RunNetwork& network, const SimulationRun& run) {
+  if (network.driven.tools.empty()) return std::nullopt;
+  double overlap_m = 0.0;
+  for (const CurvePoint& p : run.record.curve) overlap_m = std::max(overlap_m, p.overlap_m);
+  return overlap_m;
+}
+
+Json largest_overlap_json(const RunNetwork& network, const SimulationRun& run) {
+  const auto overlap_m = largest_overlap_m(network, run);
+  return overlap_m ? Json(rounded(*overlap_m, 3)) : Json(nullptr);
+}
+
 /// The contacts, and the state of the tools among them at the last output.
 Json contacts_json(const ExperimentScene& scene, const RunNetwork& network,
                    const SimulationRun& run) {
@@ -219,11 +233,9 @@ std::string contacts_text(const ExperimentScene& scene, const RunNetwork& networ
     }
     text += "\n";
   }
-  double overlap = 0.0;
-  for (const CurvePoint& p : run.record.curve) overlap = std::max(overlap, p.overlap_m);
-  if (tool > 0) {
+  if (const auto overlap_m = largest_overlap_m(network, run)) {
     text += fmt::format("tools come into spheres by at most {}: contacts are stiff, not rigid\n",
-                        sized_text(Dimension::length, overlap, 3));
+                        sized_text(Dimension::length, *overlap_m, 3));
   }
   return text;
 }
@@ -393,6 +405,7 @@ Json simulation_json(const ExperimentScene& scene, const RunNetwork& network,
             {"bonds", scene.tissue.network.bonds.size()},
             {"loads", scene.load_words},
             {"contacts", contacts_json(scene, network, run)},
+            {"largest_overlap_m", largest_overlap_json(network, run)},
             {"imposed", depth ? "depth_m" : "load_N"},
             {"response", depth ? "force_N" : "depth_m"}};
   const auto point = [](const CurvePoint& p) {
