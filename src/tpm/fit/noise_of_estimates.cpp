@@ -292,6 +292,7 @@ bool is_contradicted(const AutoregressionEstimate& found, const std::vector<doub
 /// The autoregression of the residuals. Priors count as readings of the same size, which their
 /// weight makes of them.
 AutoregressionEstimate autoregression_of(const NoiseRows& rows, bool scale_known) {
+  constexpr double kHardly = 0.5;
   constexpr Eigen::Index kLong = 20'000;  // beyond, what J follows of the noise is nothing
   Eigen::VectorXd residual = rows.residual;
   Eigen::MatrixXd jacobian = rows.jacobian;
@@ -310,8 +311,10 @@ AutoregressionEstimate autoregression_of(const NoiseRows& rows, bool scale_known
     estimate = estimate_autoregression(rows.time_s, residual, jacobian, rows.step_s);
     if (residual.size() <= kLong &&
         is_contradicted(estimate, rows.time_s, residual, jacobian, rows.step_s)) {
-      estimate = estimate_autoregression(rows.time_s, residual,
-                                         Eigen::VectorXd::Ones(residual.size()), rows.step_s);
+      // A law that is wrong is contradicted, too, but leaves residuals that follow each other.
+      const AutoregressionEstimate own = estimate_autoregression(
+          rows.time_s, residual, Eigen::VectorXd::Ones(residual.size()), rows.step_s);
+      if (own.phi < kHardly) estimate = own;
     }
     variance = estimate.variance;
   }
