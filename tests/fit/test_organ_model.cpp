@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "expected_values.hpp"
+#include "tpm/files/file.hpp"
 #include "tpm/fit/likelihood/config.hpp"
 #include "tpm/organ/scene/organ_model.hpp"
 #include "tpmkit/tpm_element.hpp"
@@ -192,4 +193,20 @@ TEST_CASE("a fit with an organ needs its scene, and one that stands", "[heavy]")
                     Catch::Contains("contacts"));
   const FitConfig good = parse(R"("model": "organ", "scene": "liver_scene.json")");
   CHECK(make_model(good)->name() == "organ");
+}
+
+TEST_CASE("equilibria are found where the potential falls by less than its rounding") {
+  TpmParameters p;
+  p.E1_Pa = p.E2_Pa = p.Eprime_Pa = 12621.3;
+  p.eta1_Pa_s = 301690.0;
+  p.spacing_m = 0.0747083;
+  const OrganModel model(
+      std::make_shared<Tissue>(read_tissue(share_dir() / "configs" / "liver_scene.json")));
+  const TpmVector values = to_vector(p);
+  const std::array<double, 1> end{std::numeric_limits<double>::infinity()};
+  for (int i = 0; i < 80; ++i) {
+    const double depth_m = 0.1e-3 + 3e-6 * i;
+    CAPTURE(depth_m);
+    CHECK_NOTHROW(model.respond(step_and_hold(depth_m, end[0]), end, values, Want::values));
+  }
 }

@@ -7,6 +7,9 @@ namespace {
 
 constexpr int kMostNewtonSteps = 60;
 constexpr int kMostHalvings = 30;
+constexpr double kArmijo = 1e-4;  // of the decrease that the slope promises
+/// Of a potential: small elongations are differences of lengths, with few digits.
+constexpr double kRounding = 1e-9;
 
 double potential(const BondSystem& bonds, const Positions& position,
                  const ViscousState& viscous_state, const Eigen::Matrix3Xd& load) {
@@ -46,14 +49,19 @@ EquilibriumSearch newton_balance(const BondSystem& bonds, const Constraints& con
     if (search.converged || !search.stable) return search;
     ++search.iterations;
     const double slope = -force.cwiseProduct(step).sum();
-    // Rounding of the potential must not stop the last steps.
-    const double rounding = 1e-14 * std::abs(energy);
     double length = 1.0;
     for (int halvings = 0;; ++halvings, length *= 0.5) {
       if (halvings == kMostHalvings) return search;
       const Positions next = position + length * step;
       const double there = potential(bonds, next, viscous_state, load);
-      if (!(there <= energy + 1e-4 * length * slope + rounding)) continue;
+      if (!(there <= energy + kArmijo * length * slope)) {
+        // Near the balance the potential falls by less than its rounding: the slope decides.
+        if (!(there <= energy + kRounding * std::abs(energy))) continue;
+        balance_forces(bonds, next, viscous_state, load, force);
+        constraints.project(force);
+        const double slope_there = -force.cwiseProduct(step).sum();
+        if (!(slope_there <= (2.0 * kArmijo - 1.0) * slope)) continue;
+      }
       position = next;
       energy = there;
       break;
