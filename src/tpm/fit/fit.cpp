@@ -1,4 +1,5 @@
 #include "tpm/fit/fit.hpp"
+#include "tpm/fit/likelihood/quantum.hpp"
 
 #include <algorithm>
 #include <cmath>

@@ -1,4 +1,5 @@
 #include "tpm/fit/fit_flags.hpp"
+#include "tpm/fit/likelihood/quantum.hpp"
 
 #include <fmt/format.h>
 

@@ -400,21 +400,6 @@ std::string words_of(const NoiseOfEstimates& noise, bool by_drive, Eigen::Index 
 
 }  // namespace
 
-double computed_variance(const ExperimentResiduals& function) {
-  double sum = 0.0;
-  int values = 0;
-  for (const FitDatum& d : function.data()) {
-    if (d.held_out || !d.value) continue;
-    ++values;
-    if (!(d.sigma > 0.0)) continue;  // an estimated one
-    const NoiseKind kind = function.config().data[d.choice].noise.kind;
-    const bool of_share = kind == NoiseKind::log || kind == NoiseKind::relative_to_model;
-    const double off = kComputedShare * (of_share ? 1.0 : std::abs(*d.value)) / d.sigma;
-    sum += off * off;
-  }
-  return values > 0 ? sum / values : 0.0;
-}
-
 std::optional<NoiseOfEstimates> noise_of_estimates(const ExperimentResiduals& function,
                                                    std::span<const FitParameter> parameters,
                                                    std::span<const double> natural) {

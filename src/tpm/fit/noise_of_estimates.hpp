@@ -48,14 +48,6 @@ struct NoiseOfEstimates {
   std::string summary;              ///< one sentence
 };
 
-/// Relative error of a reading by computing: responses and minima are exact to about 1e-10, and no
-/// instrument reads nine digits.
-constexpr double kComputedShare = 1e-9;
-
-/// Mean square of that error of the values, in units of the declared noise: the least variance that
-/// an estimate of the noise can mean.
-[[nodiscard]] double computed_variance(const ExperimentResiduals& function);
-
 /// Nothing if residuals are independent and not limited by rounding, if the configuration ignores
 /// correlation, if there are no recordings, if they are met to what computing leaves of them
 /// (computed_variance), or where residuals are no plain differences (a robust

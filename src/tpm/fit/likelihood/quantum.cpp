@@ -4,6 +4,8 @@
 #include <cmath>
 #include <vector>
 
+#include "tpm/fit/likelihood/experiment_residuals.hpp"
+
 namespace tpm::fit {
 
 double quantum_of(std::span<const double> readings) {
@@ -30,6 +32,21 @@ double quantum_of(std::span<const double> readings) {
   }
   const bool grid = static_cast<double>(on_grid) >= kShareOnGrid * static_cast<double>(gaps);
   return grid ? step : 0.0;
+}
+
+double computed_variance(const ExperimentResiduals& function) {
+  double sum = 0.0;
+  int values = 0;
+  for (const FitDatum& d : function.data()) {
+    if (d.held_out || !d.value) continue;
+    ++values;
+    if (!(d.sigma > 0.0)) continue;  // an estimated one
+    const NoiseKind kind = function.config().data[d.choice].noise.kind;
+    const bool of_share = kind == NoiseKind::log || kind == NoiseKind::relative_to_model;
+    const double off = kComputedShare * (of_share ? 1.0 : std::abs(*d.value)) / d.sigma;
+    sum += off * off;
+  }
+  return values > 0 ? sum / values : 0.0;
 }
 
 }  // namespace tpm::fit
