@@ -1,7 +1,16 @@
 #pragma once
+#include <optional>
+#include <span>
+#include <string_view>
+
+#include "tpm/base/remark.hpp"
 #include "tpm/fit/fit.hpp"
+#include "tpm/fit/recording/prepared_recording.hpp"
 
 namespace tpm::fit {
+
+/// Code of the remarks below.
+inline constexpr const char* kHistoryBeforeWindow = "history_before_window";
 
 /// Whether a law is fitted without loads that the material still remembered. Rows that --from-time
 /// or --step-time leave out when a file is read are no part of the history that drives the law: it
@@ -13,5 +22,17 @@ namespace tpm::fit {
 /// the history and is not concerned.
 /// @return true if a parameter lost its verdict
 bool doubt_history(FitResult& fit);
+
+/// The same for a law of known values that is compared with a recording: a remark of the same code,
+/// where a load that was not read ended less than 5 times the longest relaxation time before the
+/// first compared sample. A response is seen beyond the noise of the recording, and contact is
+/// where its own rows show it.
+/// @param values of all parameters of the law
+/// @param recording read from the file of its name
+/// @param of "the prediction", "the comparison": what lacks the history
+[[nodiscard]] std::optional<Remark> history_before_window(const LawSpec& law,
+                                                          std::span<const double> values,
+                                                          const PreparedRecording& recording,
+                                                          std::string_view of);
 
 }  // namespace tpm::fit
