@@ -264,6 +264,32 @@ TEST_CASE("The strain without a load of creep has physical bounds, which nothing
   CHECK(zero->fit.upper < least + 5.0 * trial.noise);
 }
 
+TEST_CASE("The slack length of a strip has physical bounds, which nothing widens", "[bounds]") {
+  // Taut from the start: along a power of no material a slack length far below it fits best.
+  Recording strip;
+  strip.drive_quantity = Quantity::relative_length;
+  strip.response_quantity = Quantity::stress;
+  for (int i = 0; i < 200; ++i) {
+    const double t = 0.05 * i;
+    strip.time_s.push_back(t);
+    strip.drive.push_back(1.0 + std::min(0.1, 0.1 * t));
+    strip.response.push_back(1e3 * std::exp(40.0 * (strip.drive.back() - 1.0)));
+  }
+  const PreparedRecording r = prepare_recording("strip.csv", strip);
+  SetupOptions setup;
+  setup.starts = 5;
+  setup.profiles = false;
+  const FitConfig config = recording_config(parse_law_name("power-0", "test"), {&r, 1}, setup);
+  const auto slack = std::ranges::find_if(
+      config.parameters, [](const auto& p) { return p.fit.name == "slack_length"; });
+  REQUIRE(slack != config.parameters.end());
+  CHECK_FALSE(slack->widest);
+  CHECK_THAT(slack->fit.lower, WithinRel(1.0 - 2.0 * 0.1, 1e-9));
+  CHECK_THAT(slack->fit.upper, WithinRel(1.0 + 0.9 * 0.1, 1e-9));
+  const FitResult fit = run_fit(config, data_sets({&r, 1}));
+  CHECK_FALSE(named(fit, "slack_length").first_bounds);
+}
+
 TEST_CASE("The zero of a stress is not moved further than what was read", "[bounds]") {
   Recording pulled;
   pulled.drive_quantity = Quantity::strain;

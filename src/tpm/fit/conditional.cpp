@@ -63,14 +63,6 @@ double further_up(const FitParameter& p, double widest) {
   return moved_bound(p.upper, std::max(p.upper, std::min(rounded(next, kReadableDigits), widest)));
 }
 
-/// True if the bound of a nuisance parameter cuts the interval of another parameter.
-bool cuts_an_interval(const FitResult& result, LimitingBound bound) {
-  return std::any_of(result.parameters.begin(), result.parameters.end(), [&](const auto& p) {
-    const auto& by = p.profile.limited_by;
-    return std::find(by.begin(), by.end(), bound) != by.end();
-  });
-}
-
 /// The root of the information just outside the bound of a parameter, which is where it would go: a
 /// law may have a kink at the bound itself. At the bound where the model ends there.
 bool root_beyond_bound(const FitResult& result, const ResidualFunction& function,
@@ -229,13 +221,7 @@ bool widen_pressed_bounds(const FitResult& result, const FitConfig& config,
     if (!widest) continue;
     FitParameter& p = parameters[i];
     const double value = result.best.natural[i];
-    const bool nuisance = is_nuisance(config, i);
-    const auto presses = [&](bool upper) {
-      return (upper ? p.at_upper(value) : p.at_lower(value)) ||
-             (nuisance && cuts_an_interval(result, {i, upper}));
-    };
-    const bool below = presses(false);
-    const bool above = presses(true);
+    const bool below = p.at_lower(value), above = p.at_upper(value);
     const double lower = below ? further_down(p, widest->lower) : p.lower;
     const double upper = above ? further_up(p, widest->upper) : p.upper;
     moved = moved || lower < p.lower || upper > p.upper;

@@ -16,9 +16,8 @@ namespace tpm::fit {
 /// imposed depth: on a bound it is undetermined.
 [[nodiscard]] bool is_contact_under_load(const FitConfig& config, std::size_t parameter);
 
-/// Moves automatic bounds (EstimatedParameter::widest) out that the fit presses on: where the
-/// estimate stands on one, or where one of a nuisance parameter cuts another parameter's interval.
-/// Each time the distance from the start is doubled (on a log scale: ten times as far).
+/// Moves automatic bounds (EstimatedParameter::widest) out that the estimate stands on. Each time
+/// the distance from the start is doubled (on a log scale: ten times as far).
 /// @param parameters the bounds of the fit, changed here
 /// @return whether any bound was moved
 [[nodiscard]] bool widen_pressed_bounds(const FitResult& result, const FitConfig& config,

@@ -346,6 +346,33 @@ Eigen::VectorXd limiting_steps(const NoiseRows& rows, double variance, double de
       .matrix();
 }
 
+/// Where estimates would be after a step, in the coordinates of the search: as far along it as no
+/// bound is passed. Times stay positive, and what trades off along the step still does.
+/// @param by of the natural parameters
+std::vector<double> moved_within_bounds(std::span<const FitParameter> parameters,
+                                        const std::vector<std::size_t>& free,
+                                        std::span<const double> natural,
+                                        const Eigen::VectorXd& by) {
+  const auto step = [&](Eigen::Index k) {
+    const std::size_t i = free[static_cast<std::size_t>(k)];
+    return by[k] / parameters[i].natural_slope(parameters[i].theta(natural[i]));
+  };
+  double share = 1.0;
+  for (Eigen::Index k = 0; k < by.size(); ++k) {
+    const std::size_t i = free[static_cast<std::size_t>(k)];
+    const FitParameter& p = parameters[i];
+    const double at = p.theta(natural[i]);
+    const double room = step(k) > 0.0 ? p.theta_upper() - at : at - p.theta_lower();
+    if (share * std::abs(step(k)) > room) share = room / std::abs(step(k));
+  }
+  std::vector<double> moved(natural.begin(), natural.end());
+  for (Eigen::Index k = 0; k < by.size(); ++k) {
+    const std::size_t i = free[static_cast<std::size_t>(k)];
+    moved[i] = parameters[i].natural(parameters[i].theta(natural[i]) + share * step(k));
+  }
+  return moved;
+}
+
 /// Bias from noise of the drive, of scaled parameters (drive_noise_slope): the mean of what the
 /// slope says here and where the estimates would be without it, where it is steeper (a dashpot
 /// answers noise the more the faster it is). Zero where it matters little.
@@ -361,13 +388,8 @@ Eigen::VectorXd bias_of_drive_noise(const ExperimentResiduals& function, const E
   const Eigen::VectorXd moved = estimates.moved_by((*here)(columns));
   const Eigen::ArrayXd error = (variance * estimates.plain_variance()).array().sqrt();
   if (!(moved.array().abs() > kMatters * error).any()) return none;
-  const Eigen::VectorXd by = moved.cwiseQuotient(estimates.length());
-  std::vector<double> without(natural.begin(), natural.end());
-  for (Eigen::Index k = 0; k < by.size(); ++k) {
-    const std::size_t i = free[static_cast<std::size_t>(k)];
-    without[i] = std::clamp(natural[i] + by[k], parameters[i].lower, parameters[i].upper);
-  }
-  const auto there = function.drive_noise_slope(without);
+  const auto there = function.drive_noise_slope(
+      moved_within_bounds(parameters, free, natural, moved.cwiseQuotient(estimates.length())));
   return 0.5 * (moved + (there ? estimates.moved_by((*there)(columns)) : moved)).cwiseAbs();
 }
 

@@ -121,8 +121,8 @@ struct EstimatedParameter {
   std::vector<Target> sets;  ///< empty for a parameter of the noise, a drift and a rise
   /// A noise parameter whose start and bounds follow from the size of the data.
   bool from_data = false;
-  /// Set where nobody stated the bounds: run_fit widens them up to these while the best fit or the
-  /// limit of an interval presses on them.
+  /// Set of a material where nobody stated the bounds: run_fit widens them up to these while the
+  /// best fit presses on them. Zero, contact and slack length have physical bounds, which stay.
   std::optional<WidestBounds> widest = std::nullopt;
   /// Adds the residual (value - mean) / sd. The prior is absolute: where the size of the noise is
   /// estimated, run_fit weighs it against the noise that it finds.

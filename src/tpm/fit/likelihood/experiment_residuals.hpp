@@ -64,9 +64,12 @@ class ExperimentResiduals final : public ResidualFunction {
   /// The same experiments, with data that can be replaced apart from these.
   [[nodiscard]] std::unique_ptr<ExperimentResiduals> copy() const;
   /// Noise e of measured drives adds f(e) to the residuals, which the law answers as if e were
-  /// motion: d/dtheta E|f(e)|^2 / 2 by the estimated parameters, natural. Estimated with as much
-  /// white noise again as the drives show at rest, before the fitted samples; none if they show
-  /// none.
+  /// motion: d/dtheta E|f(e)|^2 / 2 by the estimated parameters, natural; none if the drives show
+  /// no noise at rest, before the fitted samples. The noise of those samples is taken for white,
+  /// and the law for linear in it: the expectation is then a sum over the samples of the drive.
+  /// Moving every eighth sample by one standard deviation, up or down at random, gives the part of
+  /// these samples, but for what the law remembers eight samples later, which is as often positive
+  /// as negative (probing: Tang and Saad 2012). Eight such answers make up the sum.
   [[nodiscard]] std::optional<Eigen::VectorXd> drive_noise_slope(
       std::span<const double> natural) const;
   /// A copy with at most about `most` samples of each recording, evenly taken from the history and
@@ -99,8 +102,9 @@ class ExperimentResiduals final : public ResidualFunction {
   };
 
   ExperimentResiduals() = default;
-  /// A copy with that noise; null if there is none.
-  [[nodiscard]] std::unique_ptr<ExperimentResiduals> with_noisier_drives(std::uint64_t seed) const;
+  /// A copy with that noise in every `every`-th sample from `first` on; null if there is none.
+  [[nodiscard]] std::unique_ptr<ExperimentResiduals> with_noisier_drives(std::size_t first,
+                                                                         std::size_t every) const;
   /// Factor of a datum's residuals.
   [[nodiscard]] double weight(std::size_t datum) const;
   /// The model's answer to an experiment, one value per reading.

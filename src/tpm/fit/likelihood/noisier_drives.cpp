@@ -4,6 +4,7 @@
 #include "tpm/base/median.hpp"
 #include "tpm/base/namespaces.hpp"
 #include "tpm/base/random.hpp"
+#include "tpm/data/off_neighbours.hpp"
 #include "tpm/fit/likelihood/experiment_residuals.hpp"
 
 namespace tpm::fit {
@@ -15,22 +16,22 @@ double drive_noise_at_rest(std::span<const Knot> knots, std::size_t count) {
   constexpr std::size_t kFewest = 20;
   constexpr double kOfMedian = 1.4826;
   if (count < kFewest) return 0.0;
-  std::vector<double> off;
-  for (std::size_t i = 1; i + 1 < count; ++i) {
-    const Knot &a = knots[i - 1], &b = knots[i], &c = knots[i + 1];
-    const double share = (b.time_s - a.time_s) / (c.time_s - a.time_s);
-    off.push_back(std::abs(b.value - a.value - share * (c.value - a.value)) /
-                  std::sqrt(1.0 + share * share + (1.0 - share) * (1.0 - share)));
+  std::vector<double> time, value;
+  for (const Knot& knot : knots.first(count)) {
+    time.push_back(knot.time_s);
+    value.push_back(knot.value);
   }
+  std::vector<double> off = data::off_neighbours(time, value);
+  for (double& distance : off) distance = std::abs(distance);
   return kOfMedian * median(std::move(off));
 }
 
 }  // namespace
 
 std::unique_ptr<ExperimentResiduals> ExperimentResiduals::with_noisier_drives(
-    std::uint64_t seed) const {
+    std::size_t first, std::size_t every) const {
   std::unique_ptr<ExperimentResiduals> noisier;
-  Random random(seed);
+  Random random(first);
   for (std::size_t e = 0; e < experiments_.size(); ++e) {
     const Experiment& experiment = experiments_[e];
     const auto* course = std::get_if<TimeCourse>(&experiment.imposed);
@@ -42,7 +43,9 @@ std::unique_ptr<ExperimentResiduals> ExperimentResiduals::with_noisier_drives(
     const double sd = rest < knots.size() ? drive_noise_at_rest(knots, rest) : 0.0;
     if (!(sd > 0.0)) continue;
     std::vector<Knot> noisy(knots.begin(), knots.end());
-    for (Knot& knot : noisy) knot.value += sd * random.normal();
+    for (std::size_t i = first; i < noisy.size(); i += every) {
+      noisy[i].value += random.below(2) == 0 ? sd : -sd;
+    }
     Protocol protocol(course->protocol.drive(), std::move(noisy), course->protocol.name());
     protocol.set_equilibrium_at_start(course->protocol.equilibrium_at_start());
     if (!noisier) noisier = copy();
@@ -55,15 +58,20 @@ std::unique_ptr<ExperimentResiduals> ExperimentResiduals::with_noisier_drives(
 
 std::optional<Eigen::VectorXd> ExperimentResiduals::drive_noise_slope(
     std::span<const double> natural) const {
-  constexpr std::uint64_t kSeed = 1;
-  const auto noisier = with_noisier_drives(kSeed);
+  constexpr std::size_t kApart = 8;
   Eigen::VectorXd before, after;
   RowMatrix slopes_before, slopes_after;
-  if (!noisier || !evaluate(natural, before, &slopes_before) ||
-      !noisier->evaluate(natural, after, &slopes_after)) {
-    return std::nullopt;
+  std::optional<Eigen::VectorXd> slope;
+  for (std::size_t first = 0; first < kApart; ++first) {
+    const auto noisier = with_noisier_drives(first, kApart);
+    if (!noisier || (!slope && !evaluate(natural, before, &slopes_before)) ||
+        !noisier->evaluate(natural, after, &slopes_after)) {
+      return std::nullopt;
+    }
+    const Eigen::VectorXd part = (slopes_after - slopes_before).transpose() * (after - before);
+    slope = slope ? Eigen::VectorXd(*slope + part) : part;
   }
-  return (slopes_after - slopes_before).transpose() * (after - before);
+  return slope;
 }
 
 }  // namespace tpm::fit

@@ -8,6 +8,7 @@
 #include "tpm/base/text.hpp"
 #include "tpm/fit/fitted_law.hpp"
 #include "tpm/fit/likelihood/load_imposed.hpp"
+#include "tpm/fit/select/history_before_window.hpp"
 #include "tpmkit/error.hpp"
 #include "tpmkit/law_model.hpp"
 
@@ -157,6 +158,10 @@ Identification identify(const PreparedRecording& recording, const IdentifyOption
     throw bad_input(fmt::format("recording '{}'", recording.name),
                     "has too few samples for any of the laws", "more samples than parameters");
   }
+  if (auto remark = history_before_window(id.laws[id.result().law], id.result().estimate.values,
+                                          recording, "the identification")) {
+    id.remarks.push_back(*std::move(remark));
+  }
   if (!id.stopped) {
     id.remarks.push_back(
         {"not_stopped",
@@ -206,7 +211,10 @@ LawFile identified_law(const Identification& identification, const PreparedRecor
     deepest = std::max(deepest, r.drive[i] - contact);
   }
   if (deepest > 0.0) law.fitted_to = deepest;
-  if (!sample.estimate.identified) return law;
+  const bool cut = std::ranges::any_of(identification.remarks, [](const Remark& remark) {
+    return remark.code == kHistoryBeforeWindow;
+  });
+  if (!sample.estimate.identified || cut) return law;
   law.uncertainty = uncertainty_of(sample.estimate, identification.options.level);
   law.uncertainty->duration_s = sample.time_s - recording.from_s;
   law.uncertainty->data.push_back({recording.name, r.header.sha256,

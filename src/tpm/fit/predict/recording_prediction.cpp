@@ -14,6 +14,7 @@
 #include "tpm/fit/predict/prediction_parts.hpp"
 #include "tpm/fit/recording/placement.hpp"
 #include "tpm/fit/select/clipping.hpp"
+#include "tpm/fit/select/history_before_window.hpp"
 #include "tpmkit/error.hpp"
 #include "tpmkit/law_model.hpp"
 
@@ -291,6 +292,9 @@ LawPrediction predict_recording_by(const Model& model, const LawFile& law,
     p.reading_upper.clear();
   }
   add_drift(p, drifting);
+  if (auto remark = history_before_window(law.spec, values, recording, "the prediction")) {
+    p.remarks.insert(p.remarks.begin(), *std::move(remark));
+  }
   compare(p, law, recording);
   return p;
 }

@@ -5,22 +5,13 @@
 #include <span>
 #include <vector>
 
+#include "tpm/data/off_neighbours.hpp"
 #include "tpm/fit/recording/motion_before_load.hpp"
 
 namespace tpm::fit {
 namespace {
 
 constexpr std::size_t kFewestCarried = 10;
-
-/// A value less the line between its neighbours: what noise and corners leave of a course.
-std::vector<double> off_neighbours(std::span<const double> time_s, std::span<const double> values) {
-  std::vector<double> off;
-  for (std::size_t i = 1; i + 1 < values.size(); ++i) {
-    const double share = (time_s[i] - time_s[i - 1]) / (time_s[i + 1] - time_s[i - 1]);
-    off.push_back(values[i] - values[i - 1] - share * (values[i + 1] - values[i - 1]));
-  }
-  return off;
-}
 
 }  // namespace
 
@@ -33,8 +24,8 @@ double carried_variance(const RecordingFit& fit, const Recording& recording, std
     imposed.push_back(recording.drive[i]);
     answer.push_back(fit.predicted[i]);
   }
-  const std::vector<double> bends = off_neighbours(time, imposed);
-  const std::vector<double> answers = off_neighbours(time, answer);
+  const std::vector<double> bends = data::off_neighbours(time, imposed);
+  const std::vector<double> answers = data::off_neighbours(time, answer);
   double squares = 0.0, products = 0.0;
   for (std::size_t i = 0; i < bends.size(); ++i) {
     squares += bends[i] * bends[i];
@@ -42,13 +33,12 @@ double carried_variance(const RecordingFit& fit, const Recording& recording, std
   }
   const std::size_t still = still_samples(recording, at_rest);
   double rest_squares = 0.0;
-  const std::vector<double> rest = off_neighbours(std::span(recording.time_s).first(still),
-                                                  std::span(recording.drive).first(still));
+  const std::vector<double> rest = data::off_neighbours(std::span(recording.time_s).first(still),
+                                                        std::span(recording.drive).first(still));
   for (const double off : rest) rest_squares += off * off;
   if (!(squares > 0.0)) return 0.0;
-  constexpr double kOfLine = 1.5;  // a value less the mean of two others has 1.5 times its variance
   const double stiffness = products / squares;
-  return stiffness * stiffness * rest_squares / (kOfLine * static_cast<double>(rest.size()));
+  return stiffness * stiffness * rest_squares / static_cast<double>(rest.size());
 }
 
 }  // namespace tpm::fit

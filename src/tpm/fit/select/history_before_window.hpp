@@ -1,7 +1,16 @@
 #pragma once
+#include <optional>
+#include <span>
+#include <string_view>
+
+#include "tpm/base/remark.hpp"
 #include "tpm/fit/fit.hpp"
+#include "tpm/fit/recording/prepared_recording.hpp"
 
 namespace tpm::fit {
+
+/// Code of the remarks below.
+inline constexpr const char* kHistoryBeforeWindow = "history_before_window";
 
 /// Detects a fit without earlier loads that had not relaxed yet. Rows that --from-time
 /// or --step-time leave out when a file is read are no part of the history that drives the law: it
@@ -21,5 +30,17 @@ bool doubt_history(FitResult& fit);
 /// time passed since, no parameter of the material is identified, and a remark says so.
 /// @return true if such a history was found
 bool doubt_pulled_history(FitResult& fit);
+
+/// The same for a law of known values that is compared with a recording: a remark of the same code,
+/// where a load that was not read ended less than 5 times the longest relaxation time before the
+/// first compared sample. A response is seen beyond the noise of the recording, and contact is
+/// where its own rows show it.
+/// @param values of all parameters of the law
+/// @param recording read from the file of its name
+/// @param of "the prediction", "the comparison": what lacks the history
+[[nodiscard]] std::optional<Remark> history_before_window(const LawSpec& law,
+                                                          std::span<const double> values,
+                                                          const PreparedRecording& recording,
+                                                          std::string_view of);
 
 }  // namespace tpm::fit

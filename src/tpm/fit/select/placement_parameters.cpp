@@ -41,27 +41,24 @@ bool contact_is_seen(const LawSpec& law, const PreparedRecording& r) {
 /// Contact may lie this many times the depth of the recording before its start at most.
 constexpr double kFurthestContact = 2.0;
 
-/// The slack length of a strip: nothing measures it beforehand.
+/// The slack length of a strip: nothing measures it beforehand. It is passed in the first nine
+/// tenths of the stretch; a strip that is taut from the start was slack no further back than a
+/// contact may lie, and not below a tenth of the length at the start. These bounds are not widened
+/// where a fit presses on them: a bend of the kernel from further away swallows a lack of fit.
 AutomaticBounds slack_length_bounds(const LawSpec& law, const PreparedRecording& r) {
+  constexpr double kMostOfStretch = 0.9, kShortest = 0.1;
   FitParameter fit;
   fit.name = "slack_length";
   fit.scale = Scale::linear;
   fit.unit = shown_unit(quantity_dimension(law.drive));
   const double begin = start_drive(r);
   const double range = r.phases.peak_drive - begin;
-  fit.start = begin;
-  fit.lower = bends(law) ? begin - 0.5 * range : begin;
-  fit.upper = begin + 0.6 * range;
-  WidestBounds widest{begin - kFurthestContact * range, begin + 0.9 * range};
+  fit.lower = std::max(begin - kFurthestContact * range, kShortest * begin);
+  fit.upper = begin + kMostOfStretch * range;
   // Under a straight kernel that was in contact from the start, depth and offset say the same.
-  if (!bends(law)) {
-    fit.lower = std::max(fit.lower, r.recording.drive.front());
-    widest.lower = fit.lower;
-  }
-  widest.lower = std::min(fit.lower, std::max(widest.lower, 0.1 * begin));
-  fit.start = std::max(fit.start, fit.lower);
-  fit = readable(std::move(fit));
-  return {fit, WidestBounds{std::min(widest.lower, fit.lower), std::max(widest.upper, fit.upper)}};
+  if (!bends(law)) fit.lower = std::max(begin, r.recording.drive.front());
+  fit.start = std::max(begin, fit.lower);
+  return {readable(std::move(fit)), std::nullopt};
 }
 
 /// Where contact of a depth can lie at all: the probe touches before the force rises, and in a

@@ -3,6 +3,7 @@
 #include <array>
 #include <cmath>
 
+#include "tpm/fit/select/history_before_window.hpp"
 #include "tpm/fit/validate/comparison.hpp"
 
 namespace tpm::fit {
@@ -75,6 +76,17 @@ std::optional<double> limit_of(const Requirement& requirement, const QuantityCom
   if (size >= kTold * quantity.u_D) return requirement.value * size;
   if (quantity.quantity.kind == QuantityKind::relaxation_ratio) return requirement.value;
   return requirement.value * (is_of_response(quantity.quantity.kind) ? std::max(peak, size) : size);
+}
+
+void lack_history(RecordingComparison& comparison, const LawFile& law,
+                  const PreparedRecording& recording) {
+  if (comparison.calibration) return;  // a residual has no verdict that could lack it
+  const auto remark = history_before_window(law.spec, law.values, recording, "the comparison");
+  if (!remark) return;
+  for (QuantityComparison& q : comparison.quantities) {
+    q.remark = remark;
+    q.unknown = true;
+  }
 }
 
 void judge_quantities(RecordingComparison& r, const std::optional<Requirement>& requirement,

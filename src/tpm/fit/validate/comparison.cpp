@@ -359,6 +359,7 @@ class Comparer {
   }
 
   void judge() {
+    lack_history(result_, along_.law(), prepared_);
     const auto peak = read_quantity({QuantityKind::peak}, result_.parts, r_,
                                     result_.placement.contact, measured_);
     judge_quantities(result_, options_.requirement, quantity_dimension(r_.response_quantity),
@@ -409,9 +410,7 @@ class Comparer {
       follows.push_back(quantity(i).quantity.kind == QuantityKind::relaxation_ratio &&
                         ratio_follows);
     }
-    const std::vector<std::size_t> left_out =
-        test_together(result_.joint, error, covariance, follows, degrees);
-    for (const std::size_t i : left_out) {
+    for (const std::size_t i : test_together(result_.joint, error, covariance, follows, degrees)) {
       result_.joint.dependent.push_back(quantity(static_cast<Eigen::Index>(i)).name);
     }
   }

@@ -162,6 +162,11 @@ struct ComparisonOptions {
                                              const QuantityComparison& quantity, Dimension response,
                                              double peak);
 
+/// Makes every quantity of a recording unknown whose file begins with a load that was not read and
+/// that the law remembers (history_before_window()): E then holds what S does not remember.
+void lack_history(RecordingComparison& comparison, const LawFile& law,
+                  const PreparedRecording& recording);
+
 /// Sets limit, verdict, p-value and Holm's rejection of each quantity, what must shrink, and the
 /// verdict of all.
 /// @param response dimension of the recording's response
