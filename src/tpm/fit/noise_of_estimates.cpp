@@ -346,33 +346,6 @@ Eigen::VectorXd limiting_steps(const NoiseRows& rows, double variance, double de
       .matrix();
 }
 
-/// Where estimates would be after a step, in the coordinates of the search: as far along it as no
-/// bound is passed. Times stay positive, and what trades off along the step still does.
-/// @param by of the natural parameters
-std::vector<double> moved_within_bounds(std::span<const FitParameter> parameters,
-                                        const std::vector<std::size_t>& free,
-                                        std::span<const double> natural,
-                                        const Eigen::VectorXd& by) {
-  const auto step = [&](Eigen::Index k) {
-    const std::size_t i = free[static_cast<std::size_t>(k)];
-    return by[k] / parameters[i].natural_slope(parameters[i].theta(natural[i]));
-  };
-  double share = 1.0;
-  for (Eigen::Index k = 0; k < by.size(); ++k) {
-    const std::size_t i = free[static_cast<std::size_t>(k)];
-    const FitParameter& p = parameters[i];
-    const double at = p.theta(natural[i]);
-    const double room = step(k) > 0.0 ? p.theta_upper() - at : at - p.theta_lower();
-    if (share * std::abs(step(k)) > room) share = room / std::abs(step(k));
-  }
-  std::vector<double> moved(natural.begin(), natural.end());
-  for (Eigen::Index k = 0; k < by.size(); ++k) {
-    const std::size_t i = free[static_cast<std::size_t>(k)];
-    moved[i] = parameters[i].natural(parameters[i].theta(natural[i]) + share * step(k));
-  }
-  return moved;
-}
-
 /// Bias from noise of the drive, of scaled parameters (drive_noise_slope): the mean of what the
 /// slope says here and where the estimates would be without it, where it is steeper (a dashpot
 /// answers noise the more the faster it is). Zero where it matters little.

@@ -110,4 +110,28 @@ void require_valid(const FitParameter& p, std::string_view where) {
   }
 }
 
+std::vector<double> moved_within_bounds(std::span<const FitParameter> parameters,
+                                        const std::vector<std::size_t>& free,
+                                        std::span<const double> natural,
+                                        const Eigen::VectorXd& by) {
+  const auto step = [&](Eigen::Index k) {
+    const std::size_t i = free[static_cast<std::size_t>(k)];
+    return by[k] / parameters[i].natural_slope(parameters[i].theta(natural[i]));
+  };
+  double share = 1.0;
+  for (Eigen::Index k = 0; k < by.size(); ++k) {
+    const std::size_t i = free[static_cast<std::size_t>(k)];
+    const FitParameter& p = parameters[i];
+    const double at = p.theta(natural[i]);
+    const double room = step(k) > 0.0 ? p.theta_upper() - at : at - p.theta_lower();
+    if (share * std::abs(step(k)) > room) share = room / std::abs(step(k));
+  }
+  std::vector<double> moved(natural.begin(), natural.end());
+  for (Eigen::Index k = 0; k < by.size(); ++k) {
+    const std::size_t i = free[static_cast<std::size_t>(k)];
+    moved[i] = parameters[i].natural(parameters[i].theta(natural[i]) + share * step(k));
+  }
+  return moved;
+}
+
 }  // namespace tpm::fit

@@ -1,4 +1,6 @@
 #pragma once
+#include <Eigen/Core>
+#include <cstddef>
 #include <span>
 #include <string>
 #include <string_view>
@@ -51,5 +53,15 @@ struct FitParameter {
 
 /// Throws Error(bad_input) naming the parameter if its bounds, start and scale do not agree.
 void require_valid(const FitParameter& parameter, std::string_view where);
+
+/// Estimates after a step, taken in the coordinates of the search as far as no bound is passed:
+/// times stay positive, and parameters that trade off along the step still do.
+/// @param free numbers of the parameters that the step moves
+/// @param natural estimates, of all parameters
+/// @param by step of the free ones, natural
+[[nodiscard]] std::vector<double> moved_within_bounds(std::span<const FitParameter> parameters,
+                                                      const std::vector<std::size_t>& free,
+                                                      std::span<const double> natural,
+                                                      const Eigen::VectorXd& by);
 
 }  // namespace tpm::fit
