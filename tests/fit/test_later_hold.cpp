@@ -10,8 +10,12 @@
 #include "support/temp_folder.hpp"
 #include "tpm/base/random.hpp"
 #include "tpm/files/import/recording_file.hpp"
+#include "tpm/fit/fitted_law.hpp"
+#include "tpm/fit/online/identification.hpp"
+#include "tpm/fit/predict/law_prediction.hpp"
 #include "tpm/fit/select/fit_adequacy.hpp"
 #include "tpm/fit/select/selection.hpp"
+#include "tpm/fit/validate/comparison.hpp"
 #include "tpm/fit/verdict.hpp"
 #include "tpmkit/law_model.hpp"
 
@@ -79,8 +83,7 @@ Selection fitted(const Recording& recording, std::optional<double> contact) {
   return selected(prepare_recording("cycles.csv", recording), contact);
 }
 
-/// The fit of a file of which the reading keeps the samples from 8 s on, in the rest.
-Selection fitted_from_rest(const std::string& file, const Recording& recording) {
+void write_csv(const std::string& file, const Recording& recording) {
   std::ofstream table(file);
   table.precision(17);
   table << "Time (s),Depth (m),Force (N)\n";
@@ -88,12 +91,20 @@ Selection fitted_from_rest(const std::string& file, const Recording& recording) 
     table << recording.time_s[i] << ',' << recording.drive[i] << ',' << recording.response[i]
           << '\n';
   }
-  table.close();
+}
+
+/// A file of which the reading keeps the samples from 8 s on, in the rest.
+PreparedRecording kept_from_rest(const std::string& file) {
   ImportOptions import;
   import.from_s = 8.0;
   PreparedRecording r = prepare_recording(file, read_recording_file(file, import).recording);
   r.import = import;
-  return selected(r, 0.0);
+  return r;
+}
+
+Selection fitted_from_rest(const std::string& file, const Recording& recording) {
+  write_csv(file, recording);
+  return selected(kept_from_rest(file), 0.0);
 }
 
 }  // namespace
@@ -163,6 +174,35 @@ TEST_CASE(
   CHECK_FALSE(right.unconfirmed);
   REQUIRE((right.lower && right.upper));
   CHECK((*right.lower < 40.0 && 40.0 < *right.upper));
+}
+
+TEST_CASE("Predictions and comparisons name a load that the window of a reading leaves out") {
+  const test::TempFolder folder;
+  const std::string code = "history_before_window";
+  const std::string file = folder / "cycles.csv";
+  for (const double tau_s : {0.7, 12.0}) {
+    CAPTURE(tau_s);
+    const bool remembered = tau_s > 5.0;
+    write_csv(file, conditioned(true, tau_s));
+    const PreparedRecording cut = kept_from_rest(file);
+    // A law that was fitted to another recording.
+    const LawFile law =
+        fitted_law(fitted(conditioned(true, tau_s), std::nullopt).candidates.front().fit);
+    CHECK(test::has_remark(predict_recording(law, cut, {}).remarks, code) == remembered);
+    const RecordingComparison compared = compare_with_recording(law, cut, {});
+    CHECK((compared.verdict == ModelVerdict::not_seen) >= remembered);
+    for (const QuantityComparison& q : compared.quantities) {
+      CAPTURE(q.name);
+      CHECK((q.remark && q.remark->code == code) == remembered);
+      if (remembered) CHECK(q.unknown);
+    }
+    IdentifyOptions options;
+    options.laws = {law.spec};
+    CHECK(test::has_remark(identify(cut, options).remarks, code) == remembered);
+    PreparedRecording whole = prepare_recording(file, read_recording_file(file, {}).recording);
+    whole.from_s = cut.from_s;
+    CHECK_FALSE(test::has_remark(predict_recording(law, whole, {}).remarks, code));
+  }
 }
 
 TEST_CASE("A specimen that pulls in the history before the fitted part leaves nothing identified") {

@@ -34,6 +34,33 @@ TEST_CASE("the samples after a step are left out, as long as they ring", "[place
   CHECK(test::prepared(ramp, 3).start_up.empty());
 }
 
+TEST_CASE("a fit ends before a later step after which readings ring", "[placement]") {
+  PlacedTest test;
+  test.rest_s = 5.0;
+  test.ramp_s = 0.05;  // one sample
+  test.hold_s = 20.0;
+  test.start_m = -0.1e-3;
+  Random random(13);
+  const Recording first = test::measured(test, test::placed(test), random);
+  const double again_s = 20.0;
+  const auto twice = [&](bool rings) {
+    Recording r = first;
+    for (std::size_t i = 0; i < r.time_s.size(); ++i) {
+      const double since = r.time_s[i] - again_s;
+      if (since <= 0.0) continue;
+      r.drive[i] += 1e-3;
+      r.response[i] += 0.1;
+      if (rings) r.response[i] += 0.05 * std::exp(-since / 0.3) * std::cos(40.0 * since);
+    }
+    return prepare_recording("steps.csv", r);
+  };
+  const PreparedRecording quiet = twice(false), ringing = twice(true);
+  CHECK_THAT(ringing.start_up, Contains("the fit ends before the step at 20"));
+  CHECK(ringing.to_s <= again_s);
+  CHECK_THAT(quiet.start_up, !Contains("the fit ends before"));
+  CHECK(quiet.to_s > again_s);
+}
+
 TEST_CASE("the rest before a step that was not sampled tells the zero", "[placement]") {
   // 2 kPa beside 3 kPa that relax in 5 s: a step of the strain, or of the stress.
   const bool creeps = GENERATE(false, true);
