@@ -258,7 +258,7 @@ class Estimates {
 bool is_contradicted(const AutoregressionEstimate& found, const std::vector<double>& time_s,
                      const Eigen::VectorXd& residual, const Eigen::MatrixXd& jacobian,
                      double step_s) {
-  constexpr double kSure = 1e-3, kNothing = 1e-6;
+  constexpr double kContradicted = 1e-3, kNothing = 1e-6;
   if (!(found.phi > 0.0 && found.variance > 0.0)) return false;
   const AutoregressiveNoise noise(found.phi, step_s);
   const Eigen::VectorXd length = jacobian.colwise().norm().transpose();
@@ -286,7 +286,7 @@ bool is_contradicted(const AutoregressionEstimate& found, const std::vector<doub
     statistic += std::pow(axes.eigenvectors().col(k).dot(away), 2) / axes.eigenvalues()[k];
     degrees += 1.0;
   }
-  return degrees > 0.0 && chi_squared_tail(statistic, degrees) < kSure;
+  return degrees > 0.0 && chi_squared_tail(statistic, degrees) < kContradicted;
 }
 
 /// The autoregression of the residuals. Priors count as readings of the same size, which their

@@ -24,12 +24,12 @@ namespace {
 /// Standard deviation of the noise of neighbouring residuals; 0 if there are too few.
 double scatter_of_neighbours(const std::vector<double>& residuals) {
   constexpr std::size_t kFewest = 8;
-  constexpr double kOfMedian = 1.4826;  // of a normal distribution
+  constexpr double kDeviationOfMedian = 1.4826;  // of a normal distribution
   if (residuals.size() < kFewest) return 0.0;
   std::vector<double> steps;
   for (std::size_t i = 1; i < residuals.size(); ++i)
     steps.push_back(std::abs(residuals[i] - residuals[i - 1]));
-  return kOfMedian * median(std::move(steps)) / std::sqrt(2.0);
+  return kDeviationOfMedian * median(std::move(steps)) / std::sqrt(2.0);
 }
 
 /// Readings under load scatter by more than rounding makes, and near the rest as well as far from

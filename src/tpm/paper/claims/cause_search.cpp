@@ -71,7 +71,7 @@ std::string chosen_text(const PrintedSymbol& symbol, std::size_t choice) {
 /// An input in words for people.
 std::string called(const ClaimReader& reader, const std::string& name) {
   const PrintedSymbol* symbol = reader.set().symbol(name);
-  return symbol == nullptr ? name : symbol->words;
+  return symbol == nullptr ? name : symbol->summary;
 }
 
 void CauseSearch::add_choice(const AuditInput& input, const PrintedSymbol& symbol,
