@@ -79,7 +79,8 @@ int check(const NetworkChoice& choice, const Session& session) {
     const std::string_view where =
         choice.scene.empty() ? "options" : std::string_view(choice.scene);
     require_standing(tissue, where);
-    const bool has_contacts = !choice.scene.empty() && read_json(choice.scene).contains("contacts");
+    const bool has_contacts =
+        std::ranges::find(tissue.unused_blocks, "contacts") != tissue.unused_blocks.end();
     if (!has_contacts) require_free_contact(tissue, where);
   } catch (const Error& error) {
     if (error.code() != ExitCode::bad_input) throw;

@@ -34,7 +34,8 @@ class SameAnswer(unittest.TestCase):
         self.assertGreater(len(here), 5)
         self.assertEqual(here, {name: answer[name] for name in here})
         # Beside it stands what the answers of all commands have (docs/json.md).
-        self.assertEqual(set(answer) - set(here), {"tpm", "command", "version", "inputs", "verdicts", "remarks"} - set(here))
+        shared = {"tpm", "command", "version", "inputs", "verdicts", "remarks", "files", "next"}
+        self.assertEqual(set(answer) - set(here), shared - set(here))
         return here
 
     def test_of_a_recording(self):
