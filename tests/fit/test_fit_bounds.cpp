@@ -279,7 +279,7 @@ TEST_CASE("The slack length of a strip has physical bounds, which nothing widens
   SetupOptions setup;
   setup.starts = 5;
   setup.profiles = false;
-  const FitConfig config = recording_config(parse_law_name("power-0", "test"), {&r, 1}, setup);
+  const FitConfig config = recording_config(parse_law_name("power", "test"), {&r, 1}, setup);
   const auto slack = std::ranges::find_if(
       config.parameters, [](const auto& p) { return p.fit.name == "slack_length"; });
   REQUIRE(slack != config.parameters.end());

@@ -118,6 +118,8 @@ TEST_CASE("laws of two spring-pots have names, words and parameters", "[pair]") 
         "k_inf k1 tau1 alpha beta exponent k_tension spacing contact offset ");
   CHECK_THROWS_WITH(law_of("linear-fzener2-fluid"), Catch::Contains("fractional law"));
   CHECK_THROWS_WITH(law_of("linear-fspringpot2"), Catch::Contains("unknown law"));
+  CHECK_THROWS_WITH(law_of("power-0"), Catch::Contains("did you mean 'power'?"));
+  CHECK_THROWS_WITH(law_of("linear-1-2"), !Catch::Contains("did you mean"));
   const LawSpec zener = law_of("linear-fzener2");
   CHECK_THROWS_WITH(LawModel(zener).require_in_range(pair_values(zener, 0.5, 1.01)),
                     Catch::Contains("beta = 1.01; expected a value from 0 to 1"));

@@ -78,10 +78,11 @@ std::string nearest_law(std::string_view text) {
                                 : number   ? std::string(part)
                                            : nearest_word(part, others);
     if (nearest.empty()) return {};
-    name.append(begin == 0 ? "" : "-").append(nearest);
+    const bool none = number && nearest.find_first_not_of('0') == std::string::npos;  // linear-0
+    if (!none) name.append(begin == 0 ? "" : "-").append(nearest);
     begin = end + 1;
   }
-  return name;
+  return name == text ? std::string() : name;
 }
 
 }  // namespace
