@@ -17,6 +17,7 @@
 #include "tpm/fit/recording/loading_sense.hpp"
 #include "tpm/fit/recording/placement.hpp"
 #include "tpm/fit/recording/start_up.hpp"
+#include "tpm/fit/recording/strained_start.hpp"
 #include "tpm/fit/recording/unseen_rises.hpp"
 #include "tpm/fit/select/clipping.hpp"
 #include "tpm/fit/select/imposed_channel.hpp"
@@ -295,6 +296,7 @@ PreparedRecording prepare_recording(std::string name, Recording recording,
     r.phases.floor_response = r.recording.response[rest];
   }
   leave_out_start_up(r);
+  if (auto remark = strained_start_remark(r)) r.remarks.push_back(*std::move(remark));
   if (r.to_s > r.from_s) return r;
   throw bad_input(fmt::format("recording '{}'", r.name), "no ramp and hold before the unloading",
                   "a recording that loads before it unloads");
