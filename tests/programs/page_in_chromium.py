@@ -62,6 +62,14 @@ class CannotStart(RuntimeError):
     """Chromium ended before it answered anything, so that nothing was learnt of the page."""
 
 
+# What Chromium answers to a question that it was asked while one page went and the next came.
+CHANGED = ("Inspected target navigated or closed", "Execution context was destroyed.", "Cannot find context with specified id")
+
+
+class PageChanged(RuntimeError):
+    """The page of the question is no longer shown."""
+
+
 class Chromium:
     """Spoken to over a pair of pipes, messages that end with a zero."""
 
@@ -108,7 +116,8 @@ class Chromium:
             message = self.message()
             if message.get("id") == self.count:
                 if "error" in message:
-                    raise RuntimeError(f"{method}: {message['error']}")
+                    kind = PageChanged if message["error"].get("message") in CHANGED else RuntimeError
+                    raise kind(f"{method}: {message['error']}")
                 return message["result"]
             self.events.append(message)
 
@@ -119,6 +128,20 @@ class Chromium:
         for domain in ("Runtime", "Network", "Page", "Log"):
             self.call(f"{domain}.enable")
         self.call("Page.navigate", url=address)
+
+    def awaited(self, expression, seconds, missing):
+        """The value of an expression once it is true; another page may be loaded meanwhile."""
+        start = time.monotonic()
+        while True:
+            try:
+                answer = self.call("Runtime.evaluate", expression=expression, returnByValue=True)
+                assert "exceptionDetails" not in answer, answer
+                if answer["result"].get("value"):
+                    return answer["result"]["value"]
+            except PageChanged:
+                pass  # the question went to the page before
+            assert time.monotonic() - start < seconds, f"{missing}: {self.complaints()}"
+            time.sleep(0.05)
 
     def look(self):
         answer = self.call("Runtime.evaluate", expression=LOOK)

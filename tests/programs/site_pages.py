@@ -90,11 +90,8 @@ def chromium_or_skip(folder):
 
 def loaded(chromium, page):
     chromium.call("Page.navigate", url=page.as_uri())
-    start = time.monotonic()
     want = f"document.readyState === 'complete' && location.pathname === {urllib.parse.quote(str(page))!r}"
-    while not chromium.call("Runtime.evaluate", expression=want)["result"].get("value"):
-        assert time.monotonic() - start < 30, f"{page} does not load"
-        time.sleep(0.01)
+    chromium.awaited(want, 30, f"{page} does not load")
 
 
 def unset_formulas(chromium, page):
@@ -142,14 +139,11 @@ FAULTS = """(() => {
 
 def check_search(folder, chromium):
     """Typed into the search as a new user would: the page with the answer is among the first results."""
-    listed = "[...document.querySelectorAll('#search-results li > a')].map(a => a.getAttribute('href'))"
+    listed = f"""(found => found.some(link => link.includes('/WANTED.html')) && found)(
+        [...document.querySelectorAll('#search-results li > a')].slice(0, {FIRST}).map(a => a.getAttribute('href')))"""
     for words, wanted in SEARCHES.items():
         chromium.call("Page.navigate", url=f"{(folder / 'search.html').as_uri()}?q={urllib.parse.quote_plus(words)}")
-        start, found = time.monotonic(), []
-        while not any(f"/{wanted}.html" in link for link in found[:FIRST]):
-            assert time.monotonic() - start < 30, f"the search for '{words}' finds {found[:FIRST]}; expected {wanted}.html"
-            time.sleep(0.2)
-            found = chromium.call("Runtime.evaluate", returnByValue=True, expression=listed)["result"].get("value") or []
+        chromium.awaited(listed.replace("WANTED", wanted), 30, f"the search for '{words}' does not find {wanted}.html")
     print(f"{len(SEARCHES)} questions find their page among the first {FIRST} results")
 
 

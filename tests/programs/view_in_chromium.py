@@ -36,11 +36,11 @@ class Page:
         chromium.events.clear()
         chromium.open(file.as_uri())
         start = time.monotonic()
-        while self.js("document.body && document.body.dataset.ready") != "yes":
-            assert not chromium.complaints(), chromium.complaints()
-            assert time.monotonic() - start < 60, "the page does not get ready"
-            time.sleep(0.05)
+        self.ready("the page")
         self.seconds = time.monotonic() - start
+
+    def ready(self, what):
+        self.chromium.awaited("document.body && document.body.dataset.ready == 'yes'", 60, f"{what} does not get ready")
 
     def js(self, expression):
         answer = self.chromium.call("Runtime.evaluate", expression=expression, returnByValue=True)
@@ -393,10 +393,7 @@ def look_at_folder(chromium, tpm, folder):
     for k, name in enumerate(("deep", "shallow"), 1):
         if k > 1:
             page.js(f"delete document.body.dataset.ready; document.querySelectorAll('#contents a')[{k - 1}].click()")
-            start = time.monotonic()
-            while page.js("document.body && document.body.dataset.ready") != "yes":
-                assert time.monotonic() - start < 60, "the second result does not get ready"
-                time.sleep(0.05)
+            page.ready("the second result")
         assert page.text("title") == name, page.text("title")
         assert page.js("document.querySelector('#contents [aria-current]').textContent") == f"{name}.h5"
         most[name] = page.js("Math.max(...plots[0].main.y)")
