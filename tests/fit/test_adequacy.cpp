@@ -16,6 +16,7 @@
 using namespace tpm;
 using namespace tpm::base;
 using namespace tpm::fit;
+using Catch::Matchers::WithinRel;
 
 namespace {
 
@@ -298,6 +299,12 @@ TEST_CASE("too short a rest gives no verdict", "[adequacy]") {
   Simulated short_by_one = simulated_adequacy(20, 0.0, ResidualDefect::none, 0.0, 0.0, 1);
   short_by_one.rest.pop_back();
   CHECK_THROWS_AS(judge_adequacy(short_by_one.data()), Error);
+}
+
+TEST_CASE("readings scatter less than a noise of half a step by chance in 5 %", "[adequacy]") {
+  CHECK_THAT(hidden_noise_variance(1e6), WithinRel(4.0 / 3.0, 0.003));
+  CHECK_THAT(hidden_noise_variance(100.0), WithinRel(4.0 / 3.0 * 0.779295, 1e-5));  // tables
+  CHECK(hidden_noise_variance(2.0) == 2.0 / 3.0);
 }
 
 TEST_CASE("the grid of rounded readings is found", "[adequacy]") {

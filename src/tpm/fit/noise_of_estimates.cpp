@@ -333,15 +333,9 @@ Correlation correlation_of_rows(const NoiseRows& rows, const Eigen::VectorXd& re
 /// elsewhere.
 /// @param degrees independent readings behind `variance`
 Eigen::VectorXd limiting_steps(const NoiseRows& rows, double variance, double degrees) {
-  // Rounding itself scatters by a twelfth of the square of a step.
-  constexpr double kHidden = 4.0 / 3.0;  // (1/4 + 1/12) q^2 = 4/3 (q/2)^2
-  constexpr double kNone = 0.01;         // what is met so much better was not rounded: (q/20)^2
-  constexpr double kChance = 0.05;
-  constexpr double kFew = 0.5;  // few readings do not tell: half a step is the cautious answer
-  const double counted = std::max(degrees, 1.0);
-  const double chance = std::max(chi_squared_quantile(kChance, counted) / counted, kFew);
+  constexpr double kNone = 0.01;  // what is met so much better was not rounded: (q/20)^2
   const Eigen::ArrayXd square = rows.half_step.array().square();
-  return (square * kHidden * chance > variance && square * kNone < variance)
+  return (square * hidden_noise_variance(degrees) > variance && square * kNone < variance)
       .select(rows.half_step.array(), 0.0)
       .matrix();
 }

@@ -4,6 +4,8 @@
 #include <cmath>
 #include <vector>
 
+#include "tpm/base/distributions.hpp"
+#include "tpm/base/namespaces.hpp"
 #include "tpm/fit/likelihood/experiment_residuals.hpp"
 
 namespace tpm::fit {
@@ -32,6 +34,14 @@ double quantum_of(std::span<const double> readings) {
   }
   const bool grid = static_cast<double>(on_grid) >= kShareOnGrid * static_cast<double>(gaps);
   return grid ? step : 0.0;
+}
+
+double hidden_noise_variance(double degrees) {
+  constexpr double kOfHalfStep = 4.0 / 3.0;  // (1/4 + 1/12) q^2 = 4/3 (q/2)^2
+  constexpr double kChance = 0.05;
+  constexpr double kFew = 0.5;  // few readings do not tell: half a step is the cautious answer
+  const double counted = std::max(degrees, 1.0);
+  return kOfHalfStep * std::max(chi_squared_quantile(kChance, counted) / counted, kFew);
 }
 
 double computed_variance(const ExperimentResiduals& function) {

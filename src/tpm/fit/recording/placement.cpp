@@ -9,6 +9,7 @@
 #include "tpm/fit/adequacy.hpp"
 #include "tpm/fit/autoregressive.hpp"
 #include "tpm/fit/likelihood/load_imposed.hpp"
+#include "tpm/fit/likelihood/quantum.hpp"
 #include "tpm/fit/recording/pull_after_withdrawal.hpp"
 #include "tpm/fit/recording/rest_line.hpp"
 #include "tpm/fit/spikes_at_rest.hpp"
@@ -273,8 +274,10 @@ RestEstimate estimate_rests(const PreparedRecording& recording) {
   const bool longer = hold && alike && hold->time_s.size() > rest.reading.size() &&
                       std::ranges::none_of(rest.time_s, within);  // a rest may be held, too
   if ((longer || rest.reading.size() >= kFewestForNoise) && !constant) {
-    fit_rests(rest, squares < n * 4.0 * rounding * rounding ? rounding : 0.0,
-              longer ? hold : std::nullopt, estimate);
+    // The square of half a step is three times the variance of rounding.
+    const double hidden = 3.0 * rounding * rounding * hidden_noise_variance(n - 1.0);
+    fit_rests(rest, squares < (n - 1.0) * hidden ? rounding : 0.0, longer ? hold : std::nullopt,
+              estimate);
     return estimate;
   }
   const double noise = std::max(recording.phases.noise_sd_estimate, rounding);
