@@ -20,7 +20,7 @@ import matplotlib
 matplotlib.use("Agg")
 
 import matplotlib.pyplot as plt  # noqa: E402  (the backend is chosen first)
-from drawing_files import FONT, literal, save_drawing, text_width  # noqa: E402
+from drawing_files import FONT, literal, save_drawing, text_width, wrapped  # noqa: E402
 from matplotlib.colors import to_hex, to_rgba  # noqa: E402
 from matplotlib.lines import Line2D  # noqa: E402
 from matplotlib.patches import Patch, Rectangle  # noqa: E402
@@ -368,17 +368,6 @@ def lettered(letter, title):
     if not letter or re.match(r"\([a-z]\)( |$)", title):
         return title
     return f"({letter}) {title}".strip()
-
-
-def wrapped(parts, size, width, between=" "):
-    """Lines no wider than `width` inches, unless a part alone is."""
-    lines = []
-    for part in parts:
-        if lines and text_width(lines[-1] + between + part, size) <= width:
-            lines[-1] += between + part
-        else:
-            lines.append(part)
-    return lines
 
 
 def keep_inside(page, axes, least):

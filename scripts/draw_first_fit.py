@@ -12,6 +12,7 @@ import matplotlib
 matplotlib.use("Agg")
 import matplotlib.pyplot as plt  # noqa: E402
 from drawing_files import save_drawing  # noqa: E402
+from matplotlib.ticker import MultipleLocator  # noqa: E402
 
 
 def main():
@@ -28,6 +29,7 @@ def main():
     axes.set_xlabel("time [s]")
     axes.set_ylabel("contact force [N]")
     axes.set_ylim(0, 0.4)
+    axes.xaxis.set_major_locator(MultipleLocator(5))
     axes.legend(frameon=False, loc="lower right")
     save_drawing(page, sys.argv[2], dpi=200, metadata={"Software": None})
 

@@ -40,6 +40,9 @@ def faults_of_views():
     for tools, towards in (([], 0), ([{**plate, "direction": [0, 0, 1]}], 0), ([{**plate, "kind": "ball"}], 0), ([plate], 1)):
         if draw_deformation.views_of({"tools": tools})[1][2] != towards:
             faults.append(f"tools {tools}: the second view is not along axis {towards}")
+    for size in (draw_network.STYLE["font.size"], draw_network.NOTE_SIZE):
+        if size / 72 / draw_network.WIDTH * 400 < 8:
+            faults.append(f"text of {size} points is {size / 72 / draw_network.WIDTH * 400:.1f} pixels high in a picture of 400; expected 8")
     if [k for k in range(20) if draw_network.layer_colour(k) == draw_network.layer_colour(0)] != [0]:
         faults.append("an inner layer has the colour of the outermost")
     return faults
