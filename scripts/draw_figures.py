@@ -244,7 +244,7 @@ def draw_heat(axes, series, look, panel):
     found = [v for row in rows for v in row if not math.isnan(v)]
     if len(x) > 1 and len(y) > 1 and found and min(found) < max(found):
         lines = axes.contour(x, y, rows, levels=6, colors="white", linewidths=0.7)
-        for text in axes.clabel(lines, fontsize=6.5, fmt="%g"):  # on dark and on bright colours
+        for text in axes.clabel(lines, fontsize=8.5, fmt="%g"):  # on dark and on bright colours
             text.set_path_effects([withStroke(linewidth=1.6, foreground="#222222")])
     axes.figure.colorbar(mesh, ax=axes, fraction=0.16, pad=0.02, aspect=22)
     return Rectangle((0, 0), 1, 1, facecolor=mesh.get_cmap()(0.5))
