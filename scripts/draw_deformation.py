@@ -4,13 +4,14 @@
     draw_deformation.py PICTURES.json FOLDER
 
 undeformed, deformed, displacement, force, validity: from the front, from the side (from above where a punch would
-hide the organ), and a slice through the
-contact, enlarged; side_by_side if there are two states (TPM and MSM). Displacements are never magnified.
+hide the organ), and below them a slice through the contact, enlarged; side_by_side if there are two states (TPM and
+MSM). Displacements are never magnified.
 The same input gives the same bytes.
 """
 
 import argparse
 import json
+import re
 import sys
 from pathlib import Path
 
@@ -18,17 +19,18 @@ import draw_network as net
 import matplotlib
 import matplotlib.pyplot as plt
 import numpy as np
-from drawing_files import literal
+from drawing_files import literal, text_width, wrapped
 from matplotlib.cm import ScalarMappable
 from matplotlib.collections import EllipseCollection, LineCollection
 from matplotlib.colors import LinearSegmentedColormap, Normalize, to_rgb
 from matplotlib.lines import Line2D
 from matplotlib.patches import Circle, Polygon
 
-# Inches.
-WIDTH, LEFT, GAP, RIGHT, ABOVE, BELOW, LEGEND_ROW = 13.0, 0.65, 0.6, 1.05, 0.9, 0.7, 0.22
-MOST_HIGH = 5.0
-LEGEND_COLUMNS = 3
+# Inches; the width is that of net.
+LEFT, GAP, BAR, BETWEEN, BELOW_AXIS = 0.52, 0.52, 0.62, 0.24, 0.42
+MOST_HIGH = 2.6  # a row of panels
+PROFILE_HIGH = 1.5
+LEGEND_COLUMNS = 2
 ARROW = 3.5  # length of the probe, in radii
 PROFILE = 10.0  # radii from the contact
 FORCE_MAP = LinearSegmentedColormap.from_list("force", ["#08306B", "#4292C6", "#DADADA", "#EF6548", "#7F0000"])
@@ -71,7 +73,7 @@ def by_force(state):
     spheres = plt.get_cmap("Greys")(0.1 + 0.7 * largest / scale)[:, :3]
     strength = np.abs(force) / scale
     return Colouring(spheres, "Force in the bonds (spheres: darker where the largest at them is larger)",
-                     (bar, "force of a bond, pulling > 0 [mN]"), (bar.to_rgba(force), 0.5 + 3.0 * strength), share=0.25)
+                     (bar, "force of a bond, pulling > 0 [mN]"), (bar.to_rgba(force), 0.3 + 1.6 * strength), share=0.25)
 
 
 def by_validity(state):
@@ -100,7 +102,7 @@ def scale_bar(axes, low, high):
     decade = 10.0 ** np.floor(np.log10(room))
     length = max(k * decade for k in (1, 2, 5) if k * decade <= room)
     x, y = high[0] - 0.04 * (high[0] - low[0]), low[1] + 0.04 * (high[1] - low[1])
-    axes.plot([x, x - length], [y, y], color="black", lw=2.2, solid_capstyle="butt", zorder=95)
+    axes.plot([x, x - length], [y, y], color="black", lw=1.6, solid_capstyle="butt", zorder=95)
     axes.annotate(f"{length:g} mm", (x - 0.5 * length, y), xytext=(0, 3), textcoords="offset points",
                   ha="center", va="bottom", zorder=95, bbox={"fc": "white", "ec": "none", "alpha": 0.8, "pad": 1})
 
@@ -204,30 +206,30 @@ def draw_slice(axes, picture, position_m, tools, colouring, view, title=None):
     bonds = np.array(picture["bonds"], int).reshape(-1, 3)
     chosen = inside[bonds[:, 0]] & inside[bonds[:, 1]]
     colours, widths = colouring.bonds if colouring.bonds is not None else (np.array([to_rgb("#777777")] * len(bonds)),
-                                                                          np.full(len(bonds), 0.9))
-    axes.add_collection(LineCollection(at[bonds[chosen][:, :2]], colors=colours[chosen], linewidths=1.3 * widths[chosen],
+                                                                          np.full(len(bonds), 0.6))
+    axes.add_collection(LineCollection(at[bonds[chosen][:, :2]], colors=colours[chosen], linewidths=widths[chosen],
                                        zorder=3))
     size = np.full(np.count_nonzero(inside), 2 * colouring.share * radius)
     common = {"units": "xy", "transOffset": axes.transData}
     axes.add_collection(EllipseCollection(size, size, 0 * size, offsets=before[inside], facecolors="none",
-                                          edgecolors=REST, linestyles="--", linewidths=0.8, zorder=2, **common))
+                                          edgecolors=REST, linestyles="--", linewidths=0.5, zorder=2, **common))
     anchored = np.isin(np.flatnonzero(inside), picture["anchors"])
     axes.add_collection(EllipseCollection(
         size, size, 0 * size, offsets=at[inside], facecolors=colouring.face[inside], zorder=4,
-        edgecolors=[net.ANCHOR if a else "#333333" for a in anchored], linewidths=np.where(anchored, 1.8, 0.6), **common))
+        edgecolors=[net.ANCHOR if a else "#333333" for a in anchored], linewidths=np.where(anchored, 1.1, 0.4), **common))
     cut = 1e3 * picture["position_m"][picture["contact"]][towards]
     draw_tools(axes, [t for t in tools if abs(1e3 * t["position_m"][towards] - cut) < 1e3 * t["radius_m"]], view)
     contact = picture["contact"]
     into = np.array(picture["direction"])[[across, up]]
     axes.annotate("", at[contact] - 0.55 * radius * into, at[contact] - 2.6 * radius * into, zorder=90,
-                  arrowprops={"arrowstyle": "-|>", "color": net.CONTACT, "lw": 2.0})
+                  arrowprops={"arrowstyle": "-|>", "color": net.CONTACT, "lw": 1.4})
     low, high = slice_frame(picture, view)
     scale_bar(axes, low, high)
     finish_axes(axes, low, high, view, picture["liver"], title)
 
 
 def legend_of(picture, colouring):
-    def dot(label, size=8, **style):
+    def dot(label, size=6, **style):
         return Line2D([], [], ls="", marker="o", ms=size, label=label, **style)
 
     handles = [dot(text, mfc=colour, mec="#444444") for colour, text in colouring.flags or []]
@@ -238,52 +240,64 @@ def legend_of(picture, colouring):
                    mec=net.CONTACT)] if picture["tools"] else [])]
 
 
-def place(page, row, sizes, legend_rows):
-    """Axes side by side on one scale, mm to inches. Returns the page's height."""
-    room = WIDTH - LEFT - GAP * (len(row) - 1) - RIGHT
-    scale = min(room / sum(e[0] for e in sizes), MOST_HIGH / max(e[1] for e in sizes))
-    below = BELOW + LEGEND_ROW * legend_rows
-    height = ABOVE + scale * max(e[1] for e in sizes) + below
-    page.set_size_inches(WIDTH, height)
-    left = LEFT
-    for axes, size in zip(row, sizes):
-        axes.set_position([left / WIDTH, 1 - (ABOVE + scale * size[1]) / height, scale * size[0] / WIDTH,
-                           scale * size[1] / height])
-        left += scale * size[0] + GAP
+def place(page, rows, sizes, above, below):
+    """Rows of panels on one scale each, mm to inches; a panel without a size takes its row. Returns the page's height."""
+    heights, scales = [], []
+    for row, extents in zip(rows, sizes):
+        room = net.WIDTH - LEFT - GAP * (len(row) - 1) - (BAR if row is rows[-1] else net.RIGHT)
+        scale = extents and min(room / sum(e[0] for e in extents), MOST_HIGH / max(e[1] for e in extents))
+        scales.append(scale)
+        heights.append(scale * max(e[1] for e in extents) if extents else PROFILE_HIGH)
+    height = above + sum(heights) + (len(rows) - 1) * (BELOW_AXIS + BETWEEN) + below
+    page.set_size_inches(net.WIDTH, height)
+    top = height - above
+    for row, extents, scale, high in zip(rows, sizes, scales, heights):
+        left = LEFT
+        for axes, size in zip(row, extents or [None]):
+            wide, tall = scale * np.array(size) if extents else (net.WIDTH - LEFT - BAR, high)
+            axes.set_position([left / net.WIDTH, (top - tall) / height, wide / net.WIDTH, tall / height])
+            left += wide + GAP
+        top -= high + BELOW_AXIS + BETWEEN
     return height
 
 
-def decorate(page, row, sizes, picture, colouring, words):
+def decorate(page, rows, sizes, picture, colouring, words):
     """Places the axes and writes around them."""
-    handles = legend_of(picture, colouring)
-    net.letter(row)
-    height = place(page, row, sizes, -(-len(handles) // LEGEND_COLUMNS))
-    page.text(LEFT / WIDTH, 1 - 0.28 / height, picture["title"], fontsize=11, fontweight="bold")
-    page.text(LEFT / WIDTH, 1 - 0.5 / height, f"{colouring.title}; {words}", fontsize=9)
-    page.text(LEFT / WIDTH, 0.1 / height, picture["provenance"], fontsize=7, color="#555555")
+    handles, notes = legend_of(picture, colouring), net.notes_of(picture)
+    longest = max(text_width(handle.get_label(), net.STYLE["font.size"]) for handle in handles)
+    columns = LEGEND_COLUMNS if longest < net.WIDTH / LEGEND_COLUMNS - 0.4 else 1
+    room = net.WIDTH - 2 * net.EDGE
+    title = net.title_of(picture)
+    words = [line for part in words for line in wrapped(re.split(r"(?<=[,;]) ", part), net.STYLE["font.size"], room)]
+    net.letter([axes for row in rows for axes in row])
+    height = place(page, rows, sizes, 0.48 + (len(title) + len(words)) * net.TITLE_ROW, net.below_panels(handles, columns, notes))
     if colouring.bar is not None:
         mappable, label = colouring.bar
-        box = row[-1].get_position()
-        bar = page.add_axes([1 - 0.82 / WIDTH, box.y0, 0.14 / WIDTH, box.height])
+        box = rows[-1][-1].get_position()
+        bar = page.add_axes([box.x1 + 0.1 / net.WIDTH, box.y0, 0.12 / net.WIDTH, box.height])
         page.colorbar(mappable, cax=bar).set_label(label)
-    page.legend(handles=handles, loc="lower center", ncol=LEGEND_COLUMNS, frameon=False,
-                bbox_to_anchor=(0.5, 0.22 / height))
+    net.draw_words(page, height, title, words, handles, columns, notes)
 
 
 def size_of(frame):
     return frame[1] - frame[0]
 
 
+def new_page(*row_lengths):
+    """A page with so many axes in each row."""
+    page = plt.figure()
+    return page, [[page.add_subplot() for _ in range(count)] for count in row_lengths]
+
+
 def draw_one(picture, position_m, tools, colouring, words):
-    page, axes = plt.subplots(1, 3)
+    page, rows = new_page(2, 1)
     views = views_of(picture)
-    for one, view in zip(axes, views):
-        draw_view(one, picture, position_m, tools, colouring, view)
+    for axes, view in zip(rows[0], views):
+        draw_view(axes, picture, position_m, tools, colouring, view)
     cut = slice_view(picture)
-    draw_slice(axes[2], picture, position_m, tools, colouring, cut, "Slice through the contact")
-    whole, enlarged = [size_of(frame_of(picture, view)) for view in views], size_of(slice_frame(picture, cut))
-    sizes = [*whole, enlarged * min(whole[0] / enlarged)]  # as high or as wide as the view from the front
-    decorate(page, axes, sizes, picture, colouring, words)
+    draw_slice(rows[1][0], picture, position_m, tools, colouring, cut, "Slice through the contact")
+    sizes = [[size_of(frame_of(picture, view)) for view in views], [size_of(slice_frame(picture, cut))]]
+    decorate(page, rows, sizes, picture, colouring, [f"{colouring.title}; {words}"])
     return page
 
 
@@ -295,12 +309,12 @@ def draw_profile(axes, picture, colours):
     chosen = (layer == layer[contact]) & (away < PROFILE * 1e3 * picture["radius_m"])
     for state, colour, marker in zip(picture["states"], colours, "o^"):
         yielded = (1e3 * np.array(state["position_m"]) - rest) @ direction
-        axes.plot(away[chosen], yielded[chosen], marker, ms=4.5, mfc=colour, mec="white", mew=0.4, label=state["name"])
+        axes.plot(away[chosen], yielded[chosen], marker, ms=3.5, mfc=colour, mec="white", mew=0.3, label=state["name"])
     axes.axhline(0.0, color="#888888", lw=0.6)
     axes.invert_yaxis()  # into the organ is down
-    axes.set_title("The layer of the contact", loc="left")
+    axes.set_title("Displacement in the layer of the contact", loc="left")
     axes.set_xlabel("distance from the contact at rest [mm]")
-    axes.set_ylabel("displacement along the probe [mm]")
+    axes.set_ylabel("along the probe [mm]")
     axes.legend(frameon=False, loc="lower right")
 
 
@@ -310,13 +324,14 @@ def draw_two(picture):
     values = [np.array(s["displacement_mm"]) for s in states]
     scale = max(v.max() for v in values)
     cut = slice_view(picture)
-    page, axes = plt.subplots(1, 3)
-    draw_profile(axes[0], picture, ["#0072B2", "#D55E00"])
-    sizes = [size_of(slice_frame(picture, cut))] * 3
-    for one, state, value in zip(axes[1:], states, values):
-        colouring = by_number(value, "displacement [mm]", "Both models on the same spheres", scale)
-        draw_slice(one, picture, state["position_m"], state["tools"], colouring, cut, f"{state['name']}, {state['summary']}")
-    decorate(page, axes, sizes, picture, colouring, "; ".join(f"{s['name']}: {s['roughness']}" for s in states))
+    page, rows = new_page(1, 2)
+    draw_profile(rows[0][0], picture, ["#0072B2", "#D55E00"])
+    sizes = [None, [size_of(slice_frame(picture, cut))] * 2]
+    for axes, state, value in zip(rows[1], states, values):
+        colouring = by_number(value, "displacement [mm]", "", scale)
+        draw_slice(axes, picture, state["position_m"], state["tools"], colouring, cut, f"{state['name']}, slice")
+    rows[1][1].set_ylabel("")
+    decorate(page, rows, sizes, picture, colouring, [f"{s['name']}: {s['summary']}; {s['roughness']}" for s in states])
     return page
 
 

@@ -20,7 +20,7 @@ import matplotlib
 matplotlib.use("Agg")
 
 import matplotlib.pyplot as plt  # noqa: E402  (the backend is chosen first)
-from drawing_files import FONT, literal, save_drawing, text_width  # noqa: E402
+from drawing_files import FONT, literal, save_drawing, text_width, wrapped  # noqa: E402
 from matplotlib.colors import to_hex, to_rgba  # noqa: E402
 from matplotlib.lines import Line2D  # noqa: E402
 from matplotlib.patches import Patch, Rectangle  # noqa: E402
@@ -244,7 +244,7 @@ def draw_heat(axes, series, look, panel):
     found = [v for row in rows for v in row if not math.isnan(v)]
     if len(x) > 1 and len(y) > 1 and found and min(found) < max(found):
         lines = axes.contour(x, y, rows, levels=6, colors="white", linewidths=0.7)
-        for text in axes.clabel(lines, fontsize=6.5, fmt="%g"):  # on dark and on bright colours
+        for text in axes.clabel(lines, fontsize=8.5, fmt="%g"):  # on dark and on bright colours
             text.set_path_effects([withStroke(linewidth=1.6, foreground="#222222")])
     axes.figure.colorbar(mesh, ax=axes, fraction=0.16, pad=0.02, aspect=22)
     return Rectangle((0, 0), 1, 1, facecolor=mesh.get_cmap()(0.5))
@@ -368,17 +368,6 @@ def lettered(letter, title):
     if not letter or re.match(r"\([a-z]\)( |$)", title):
         return title
     return f"({letter}) {title}".strip()
-
-
-def wrapped(parts, size, width, between=" "):
-    """Lines no wider than `width` inches, unless a part alone is."""
-    lines = []
-    for part in parts:
-        if lines and text_width(lines[-1] + between + part, size) <= width:
-            lines[-1] += between + part
-        else:
-            lines.append(part)
-    return lines
 
 
 def keep_inside(page, axes, least):

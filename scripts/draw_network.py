@@ -19,7 +19,7 @@ matplotlib.use("Agg")
 
 import matplotlib.pyplot as plt  # noqa: E402  (the backend is chosen first)
 import numpy as np  # noqa: E402
-from drawing_files import literal, save_drawing  # noqa: E402
+from drawing_files import literal, save_drawing, wrapped  # noqa: E402
 from matplotlib.collections import EllipseCollection, LineCollection  # noqa: E402
 from matplotlib.colors import to_rgb  # noqa: E402
 from matplotlib.lines import Line2D  # noqa: E402
@@ -33,11 +33,14 @@ VIEWS = [
     (0, 1, 2, -1, "From the front", "to the patient's right, x", "Seen along +z", "x"),
     (2, 1, 0, 1, "From the patient's right", "front to back, z", "Seen along -x", "z"),
 ]
-# Inches.
-WIDTH, LEFT, RIGHT, ABOVE, BELOW, MOST_HIGH = 11.0, 0.7, 0.15, 0.75, 1.15, 7.0
+# Inches: one and a half columns of a journal (130 mm), at which the text is 8 pixels high where 400 pixels show it.
+WIDTH, LEFT, RIGHT, ABOVE, BELOW, MOST_HIGH = 130 / 25.4, 0.52, 0.08, 0.56, 0.42, 4.0
+TITLE_ROW, LEGEND_ROW, NOTE_ROW, EDGE = 0.18, 0.16, 0.15, 0.08
+TITLE_SIZE, NOTE_SIZE = 10, 7.5  # points
+LEGEND_COLUMNS = 2
 SLABS = 16  # of the depth, drawn one after the other
-STYLE = {"svg.fonttype": "none", "svg.hashsalt": "tpmkit", "font.family": "DejaVu Sans", "font.size": 8.5,
-         "axes.titlesize": 9.5, "axes.spines.top": False, "axes.spines.right": False}
+STYLE = {"svg.fonttype": "none", "svg.hashsalt": "tpmkit", "font.family": "DejaVu Sans", "font.size": 8,
+         "axes.titlesize": 9, "legend.handlelength": 1.2, "legend.columnspacing": 1.2, "axes.linewidth": 0.6, "axes.spines.top": False, "axes.spines.right": False}
 
 
 def layer_colour(k):
@@ -60,7 +63,7 @@ def draw_bonds(axes, at, bonds, depth, slab):
     near = 0.5 * (depth[bonds[:, 0]] + depth[bonds[:, 1]])
     ends = at[bonds[slab_of(near) == slab][:, :2]]
     strength = 0.85 - 0.65 * (slab + 0.5) / SLABS  # grey, darker where nearer
-    axes.add_collection(LineCollection(ends, colors=str(round(strength, 3)), linewidths=0.6, zorder=2 + slab))
+    axes.add_collection(LineCollection(ends, colors=str(round(strength, 3)), linewidths=0.35, zorder=2 + slab))
 
 
 def draw_spheres(axes, at, depth, picture, face, anchored, slab, fade=True, share=0.5):
@@ -73,7 +76,7 @@ def draw_spheres(axes, at, depth, picture, face, anchored, slab, fade=True, shar
     axes.add_collection(EllipseCollection(
         size, size, np.zeros(len(order)), units="xy", offsets=at[order], transOffset=axes.transData,
         facecolors=(shaded(face, depth) if fade else face)[order], edgecolors=rim,
-        linewidths=np.where(anchored[order], 1.5, 0.4), zorder=2.5 + slab))
+        linewidths=np.where(anchored[order], 0.9, 0.25), zorder=2.5 + slab))
 
 
 def draw_contact(axes, at, picture, view, arrow=ARROW, named=True):
@@ -83,20 +86,20 @@ def draw_contact(axes, at, picture, view, arrow=ARROW, named=True):
     across, up = view[:2]
     normal = np.array(picture["normal"][contact])
     here, size = at[contact], 1e3 * picture["radius_m"]
-    axes.plot(*here, "o", ms=6.5, mfc=CONTACT, mec="white", mew=0.8, zorder=90)
+    axes.plot(*here, "o", ms=4.5, mfc=CONTACT, mec="white", mew=0.6, zorder=90)
     flat = np.array([normal[across], normal[up]])
     if np.linalg.norm(flat) < 0.5:  # the probe points into the page
-        axes.plot(*here, "o", ms=15, mfc="none", mec=CONTACT, mew=1.6, zorder=90)
+        axes.plot(*here, "o", ms=10, mfc="none", mec=CONTACT, mew=1.2, zorder=90)
         text_at = here + np.array([0.0, 1.2 * size])
     else:
         start = here + arrow * size * flat
-        axes.annotate("", here + 0.6 * size * flat, start, arrowprops={"arrowstyle": "-|>", "color": CONTACT, "lw": 2.0},
+        axes.annotate("", here + 0.6 * size * flat, start, arrowprops={"arrowstyle": "-|>", "color": CONTACT, "lw": 1.4},
                       zorder=90)
         text_at = here + 0.6 * arrow * size * flat + np.array([0.0, 0.5 * size])
     if not named:
         return
-    axes.annotate(f"probe on sphere {contact + 1}", text_at, ha="center", va="bottom", color=CONTACT, fontweight="bold",
-                  zorder=91, bbox={"fc": "white", "ec": "none", "alpha": 0.85, "pad": 1.5})
+    axes.annotate(f"probe on\nsphere {contact + 1}", text_at, ha="center", va="bottom", color=CONTACT, fontweight="bold",
+                  zorder=91, bbox={"fc": "white", "ec": "none", "alpha": 0.85, "pad": 1})
 
 
 def draw_view(axes, picture, position, view):
@@ -137,37 +140,63 @@ def layer_name(k, count):
     return "inner layer" if count == 2 else f"layer {k + 1}"
 
 
-def legend(page, picture, bottom):
-    handles = [Line2D([], [], ls="", marker="o", ms=8, mfc=layer_colour(k), mec="#553333",
+def legend_handles(picture):
+    handles = [Line2D([], [], ls="", marker="o", ms=6, mfc=layer_colour(k), mec="#553333",
                       label=layer_name(k, picture["layer_count"])) for k in range(min(picture["layer_count"], 4))]
     if picture["layer_count"] > 4:
         handles[-1].set_label("and deeper, the colours repeating")
     if picture["anchors"]:
-        handles.append(Line2D([], [], ls="", marker="o", ms=8, mfc="#8890A8", mec=ANCHOR, mew=1.8,
+        handles.append(Line2D([], [], ls="", marker="o", ms=6, mfc="#8890A8", mec=ANCHOR, mew=1.4,
                               label=f"anchored ({len(picture['anchors'])} spheres)"))
-    if picture["contact"] is not None:
-        handles.append(Line2D([], [], ls="", marker="o", ms=6, mfc=CONTACT, mec="white", label="contact sphere"))
     if len(picture["bonds"]) <= MOST_BONDS:
         handles.append(Line2D([], [], color="#555555", lw=1.0, label=f"bonds ({len(picture['bonds'])})"))
-    page.legend(handles=handles, loc="lower center", ncol=len(handles), frameon=False, bbox_to_anchor=(0.5, bottom))
+    return handles
+
+
+def title_of(picture):
+    """Lines of the title, which is drawn in bold, and so wider than measured."""
+    return wrapped(picture["title"].split(), 1.15 * TITLE_SIZE, WIDTH - 2 * EDGE)
+
+
+def draw_words(page, height, title, words, handles, columns, notes):
+    """Lines above the panels, the title in bold; the legend and the provenance below them."""
+    for i, line in enumerate([*title, *words]):
+        bold = i < len(title)
+        page.text(EDGE / WIDTH, 1 - (0.2 + i * TITLE_ROW) / height, line, fontsize=TITLE_SIZE if bold else STYLE["font.size"],
+                  fontweight="bold" if bold else "normal")
+    for i, line in enumerate(reversed(notes)):
+        page.text(EDGE / WIDTH, (0.06 + i * NOTE_ROW) / height, line, fontsize=NOTE_SIZE, color="#555555")
+    if handles:
+        page.legend(handles=handles, loc="lower center", ncol=columns, frameon=False, borderaxespad=0, borderpad=0,
+                    labelspacing=0.4, bbox_to_anchor=(0.5, (0.1 + len(notes) * NOTE_ROW) / height))
+
+
+def below_panels(handles, columns, notes):
+    """Inches of the legend, of the provenance and of the axis above them."""
+    return BELOW + LEGEND_ROW * -(-len(handles) // columns) + NOTE_ROW * len(notes) + 0.1
+
+
+def notes_of(picture):
+    return wrapped(picture["provenance"].split(), NOTE_SIZE, WIDTH - 2 * EDGE)
 
 
 def draw(picture):
     position = 1e3 * np.array(picture["position_m"])
     page, axes = plt.subplots(1, 2)
     extents = [draw_view(one, picture, position, view) for one, view in zip(axes, VIEWS)]
+    handles, notes = legend_handles(picture), notes_of(picture)
+    below = below_panels(handles, LEGEND_COLUMNS, notes)
     # One scale for both views, mm to inches: what the width leaves, unless that gets too high.
     scale = min((WIDTH - 2 * LEFT - RIGHT) / sum(e[0] for e in extents), MOST_HIGH / max(e[1] for e in extents))
-    height = scale * max(e[1] for e in extents) + BELOW + ABOVE
+    title = title_of(picture)
+    height = scale * max(e[1] for e in extents) + below + ABOVE + (len(title) - 1) * TITLE_ROW
     page.set_size_inches(WIDTH, height)
     left = LEFT
     for one, extent in zip(axes, extents):
-        one.set_position([left / WIDTH, BELOW / height, scale * extent[0] / WIDTH, scale * extent[1] / height])
+        one.set_position([left / WIDTH, below / height, scale * extent[0] / WIDTH, scale * extent[1] / height])
         left += scale * extent[0] + LEFT
     letter(axes)
-    page.text(LEFT / WIDTH, 1 - 0.3 / height, picture["title"], fontsize=11, fontweight="bold")
-    legend(page, picture, 0.27 / height)
-    page.text(LEFT / WIDTH, 0.1 / height, picture["provenance"], fontsize=7, color="#555555")
+    draw_words(page, height, title, [], handles, LEGEND_COLUMNS, notes)
     return page
 
 

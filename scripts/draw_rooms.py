@@ -10,8 +10,9 @@ import sys
 from html import escape
 from pathlib import Path
 
-WIDTH, BOX_WIDTH, BOX_HEIGHT, GAP, TOP = 1150, 560, 50, 20, 30
-LEFT = 150
+# At a width of 400 pixels the smallest text is 8 pixels high. The folders of a room stand in the page's table.
+WIDTH, BOX_WIDTH, BOX_HEIGHT, GAP, TOP = 540, 110, 30, 18, 48
+LEFT, FIRST_FLOW, FLOW_GAP = 105, 265, 104
 COLOURS = ("#b3541e", "#1f6f8b", "#5b7f2b")
 
 
@@ -116,15 +117,15 @@ def drawing(root: Path) -> str:
     rooms = rooms_of(page)
     names = list(reversed(rooms))  # the ground at the bottom
     y_of = {name: TOP + i * (BOX_HEIGHT + GAP) for i, name in enumerate(names)}
-    height = TOP + len(names) * (BOX_HEIGHT + GAP) + 20
-    out = [f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {WIDTH} {height}" font-family="sans-serif" font-size="13">',
+    height = TOP + len(names) * (BOX_HEIGHT + GAP) + 30
+    out = [f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {WIDTH} {height}" font-family="sans-serif" font-size="14">',
            f'<rect width="{WIDTH}" height="{height}" fill="white"/>',
            '<defs><marker id="tip" markerWidth="8" markerHeight="8" refX="7" refY="4" orient="auto">'
            '<path d="M0,0 L8,4 L0,8 z" fill="#888"/></marker></defs>']
     # Includes: a curve at the left of the boxes, further out the further it reaches.
     for i, (a, b) in enumerate(nearest(arrows(root))):
         span = names.index(b) - names.index(a)
-        start, end = y_of[a] + BOX_HEIGHT - 12, y_of[b] + 12 + 3 * (i % 4)
+        start, end = y_of[a] + BOX_HEIGHT - 8, y_of[b] + 8 + 3 * (i % 4)
         if span == 1:
             x = LEFT + BOX_WIDTH / 2
             out.append(f'<path d="M{x},{y_of[a] + BOX_HEIGHT} L{x},{y_of[b] - 1}" fill="none" stroke="#888" '
@@ -136,11 +137,10 @@ def drawing(root: Path) -> str:
     for name in names:
         y = y_of[name]
         out.append(f'<rect x="{LEFT}" y="{y}" width="{BOX_WIDTH}" height="{BOX_HEIGHT}" rx="6" fill="#f3f1ec" stroke="#555"/>')
-        out.append(f'<text x="{LEFT + 12}" y="{y + 20}" font-weight="bold">{escape(name)}</text>')
-        out.append(f'<text x="{LEFT + 12}" y="{y + 38}" fill="#333">{escape(", ".join(f for f in rooms[name] if f != "."))}</text>')
+        out.append(f'<text x="{LEFT + BOX_WIDTH / 2:g}" y="{y + 20}" text-anchor="middle">{escape(name)}</text>')
     # Flows: a line at the right through the rooms of its steps.
     for i, (flow, steps) in enumerate(flows_of(page).items()):
-        x = LEFT + BOX_WIDTH + 70 + 140 * i
+        x = FIRST_FLOW + FLOW_GAP * i
         headers = public_headers(root)
         at = [headers[h.split("/")[1]] if h.startswith("tpmkit/") else h.split("/")[0] for _, h, _ in steps]
         visited = [at[0]] + [b for a, b in zip(at, at[1:]) if a != b]
@@ -148,15 +148,18 @@ def drawing(root: Path) -> str:
         path, drop = [], {}
         for k, room in enumerate(visited):
             drop[room] = drop.get(room, 0) + 1
-            path.append((x + 16 * (drop[room] - 1), y_of[room] + BOX_HEIGHT / 2))
+            path.append((x + 21 * (drop[room] - 1), y_of[room] + BOX_HEIGHT / 2))
         out.append(f'<polyline points="{" ".join(f"{px:g},{py:g}" for px, py in path)}" fill="none" stroke="{colour}" '
                    'stroke-width="2.5"/>')
         for k, (px, py) in enumerate(path):
-            out.append(f'<circle cx="{px:g}" cy="{py:g}" r="9" fill="{colour}"/>')
-            out.append(f'<text x="{px:g}" y="{py + 4:g}" fill="white" font-size="11" text-anchor="middle">{k + 1}</text>')
-        out.append(f'<text x="{x}" y="18" fill="{colour}" font-size="12" text-anchor="middle">{escape(flow)}</text>')
-    out.append(f'<text x="12" y="{height - 8}" fill="#555" font-size="12">grey: includes that no chain of others implies; '
-               'coloured: the rooms that a flow passes, in order</text>')
+            out.append(f'<circle cx="{px:g}" cy="{py:g}" r="10" fill="{colour}"/>')
+            out.append(f'<text x="{px:g}" y="{py + 4:g}" fill="white" font-size="12" text-anchor="middle">{k + 1}</text>')
+        start, _, end = flow.partition(" to ")
+        for row, words in enumerate((start, f"to {end}")):
+            out.append(f'<text x="{x}" y="{18 + 17 * row}" fill="{colour}" text-anchor="middle">{escape(words)}</text>')
+    for row, words in enumerate(("arrows: a room includes another (what a chain of others implies is left out)",
+                                 "numbers: the rooms that a flow passes, in order")):
+        out.append(f'<text x="12" y="{height - 24 + 16 * row}" fill="#555" font-size="12">{words}</text>')
     out.append("</svg>")
     return "\n".join(out) + "\n"
 

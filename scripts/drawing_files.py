@@ -126,3 +126,14 @@ def text_width(text, size):
     from matplotlib.font_manager import FontProperties
     from matplotlib.textpath import text_to_path
     return text_to_path.get_text_width_height_descent(text, FontProperties(family=[FONT], size=size), False)[0] / 72
+
+
+def wrapped(parts, size, width, between=" "):
+    """Lines no wider than `width` inches, unless a part alone is."""
+    lines = []
+    for part in parts:
+        if lines and text_width(lines[-1] + between + part, size) <= width:
+            lines[-1] += between + part
+        else:
+            lines.append(part)
+    return lines

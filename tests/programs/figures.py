@@ -40,9 +40,23 @@ def faults_of_views():
     for tools, towards in (([], 0), ([{**plate, "direction": [0, 0, 1]}], 0), ([{**plate, "kind": "ball"}], 0), ([plate], 1)):
         if draw_deformation.views_of({"tools": tools})[1][2] != towards:
             faults.append(f"tools {tools}: the second view is not along axis {towards}")
+    for size in (draw_network.STYLE["font.size"], draw_network.NOTE_SIZE):
+        if size / 72 / draw_network.WIDTH * 400 < 8:
+            faults.append(f"text of {size} points is {size / 72 / draw_network.WIDTH * 400:.1f} pixels high in a picture of 400; expected 8")
     if [k for k in range(20) if draw_network.layer_colour(k) == draw_network.layer_colour(0)] != [0]:
         faults.append("an inner layer has the colour of the outermost")
     return faults
+
+
+def faults_of_first_fit():
+    """The picture of the README takes readings and law by what they are: their labels have changed."""
+    sys.path.insert(0, str(SCRIPT.parent))
+    import draw_first_fit
+    fitted, law = series("readings, fitted", "measured", [1.0]), {"label": "fitted law", "kind": "line"}
+    drawn = {"series": [fitted, series("readings, not fitted", "measured", [0.0]), {"label": "band", "kind": "band"}, law]}
+    if draw_first_fit.first_of(drawn, "points") is not fitted or draw_first_fit.first_of(drawn, "line") is not law:
+        return ["draw_first_fit.py does not find the fitted readings and the law"]
+    return []
 
 
 def faults_of_verdicts():
@@ -130,7 +144,7 @@ def main():
     long = {**panel("A title of a panel that is far too long for one line above half of a page", axis,
                     [series("a label that is far too long to stand beside another one below a figure " * 2, "measured", [1.0])])}
     figures = [figure, {"id": "d", "title": "", "caption": "", "panels": [long, long, long]}] + [{"id": id, "title": "", "caption": "", "panels": [p]} for id, p in (("b", of_names), ("c", numbered))]
-    faults = faults_of_views() + faults_of_verdicts()
+    faults = faults_of_views() + faults_of_first_fit() + faults_of_verdicts()
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
         (folder / "figures.json").write_text(json.dumps({"figures": figures}))

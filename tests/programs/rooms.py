@@ -167,6 +167,9 @@ def main():
     drawn = root / "docs/figures/rooms.svg"
     if not faults and (not drawn.exists() or drawn.read_text(encoding="utf-8") != rooms.drawing(root)):
         faults.append("docs/figures/rooms.svg: not what is drawn now; python3 scripts/draw_rooms.py > docs/figures/rooms.svg")
+    sizes = [int(size) for size in re.findall(r'font-size="(\d+)"', rooms.drawing(root))]
+    if min(sizes) / rooms.WIDTH * 400 < 8:
+        faults.append(f"docs/figures/rooms.svg: text of {min(sizes)} is less than 8 pixels high where the picture is 400 wide")
     for fault in faults:
         print(fault)
     arrows = rooms.arrows(root)
