@@ -8,7 +8,6 @@
 #include "support/one_law.hpp"
 #include "support/remarks.hpp"
 #include "tpm/fit/adequacy.hpp"
-#include "tpm/fit/recording/unseen_rises.hpp"
 #include "tpm/fit/verdict.hpp"
 
 using namespace tpm;

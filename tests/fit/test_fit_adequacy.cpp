@@ -15,7 +15,6 @@
 #include "tpm/fit/groups/specimens.hpp"
 #include "tpm/fit/groups/young_moduli.hpp"
 #include "tpm/fit/predict/law_prediction.hpp"
-#include "tpm/fit/select/clipping.hpp"
 #include "tpm/fit/select/fit_adequacy.hpp"
 #include "tpm/fit/select/unloading_test.hpp"
 #include "tpm/fit/verdict.hpp"

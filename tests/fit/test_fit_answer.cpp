@@ -12,7 +12,6 @@
 #include "tpm/base/text.hpp"
 #include "tpm/fit/show/fit_answer.hpp"
 #include "tpm/fit/show/recording_report.hpp"
-#include "tpm/fit/verdict.hpp"
 #include "tpm/fit/waterfall.hpp"
 #include "tpmkit/law_model.hpp"
 
