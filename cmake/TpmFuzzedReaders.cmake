@@ -2,7 +2,7 @@
 # (TPM_FUZZ_ARCHIVES). What is in both is taken from here, because it stands first. Sources of all rooms are compiled
 # together: what they share, keys and JSON for the most part, takes the compiler longer than what is their own.
 set(readers_base error text units)
-set(readers_files check_sum checksum clock_text contained delimited document_place file file_roles json number_style origin_mark
+set(readers_files checksum clock_text contained delimited document_place file file_roles json number_style origin_mark
     other_kind row_log separator unit_words zip_archive)
 set(readers_files_keys file_kind form types)
 set(readers_files_hdf5 hdf5_contents hdf5_driver hdf5_handle hdf5_reader)

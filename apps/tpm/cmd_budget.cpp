@@ -12,7 +12,6 @@
 #include "recording_options.hpp"
 #include "tpm/base/text.hpp"
 #include "tpm/fit/predict/error_budget.hpp"
-#include "tpm/fit/show/budget_answer.hpp"
 #include "tpm/fit/show/budget_report.hpp"
 #include "tpm/organ/scene/experiment_scene.hpp"
 #include "tpm/show/short_answer.hpp"

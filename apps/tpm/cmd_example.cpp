@@ -2,7 +2,6 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <cctype>
 #include <filesystem>
 #include <memory>
 #include <string>
@@ -15,7 +14,6 @@
 #include "tpm/base/nearest_word.hpp"
 #include "tpm/base/text.hpp"
 #include "tpm/files/file.hpp"
-#include "tpm/show/short_answer.hpp"
 #include "tpm/show/table_document.hpp"
 #include "tpmkit/error.hpp"
 

@@ -4,7 +4,6 @@
 #include <filesystem>
 #include <memory>
 
-#include "answer.hpp"
 #include "common_options.hpp"
 #include "fit_options.hpp"
 #include "tpm/base/text.hpp"

@@ -14,7 +14,6 @@
 #include "tpm/fit/show/identification_report.hpp"
 #include "tpm/show/json_table_csv.hpp"
 #include "tpm/show/short_answer.hpp"
-#include "tpmkit/units.hpp"
 
 namespace tpm::app {
 namespace {

@@ -1,5 +1,4 @@
 // tpm material: a fitted law on an organ.
-#include <fmt/format.h>
 
 #include <memory>
 

@@ -13,14 +13,12 @@
 #include "protocol_options.hpp"
 #include "recording_options.hpp"
 #include "tpm/base/text.hpp"
-#include "tpm/files/json.hpp"
 #include "tpm/files/other_kind.hpp"
 #include "tpm/fit/predict/law_prediction.hpp"
 #include "tpm/fit/predict/organ_prediction.hpp"
 #include "tpm/fit/show/prediction_report.hpp"
 #include "tpmkit/error.hpp"
 #include "tpmkit/law_file.hpp"
-#include "tpmkit/units.hpp"
 
 namespace tpm::app {
 namespace {

@@ -1,7 +1,6 @@
 
 #include "answer.hpp"
 #include "command.hpp"
-#include "tpm/files/json.hpp"
 #include "tpmkit/version.hpp"
 
 namespace tpm::app {

@@ -6,7 +6,6 @@
 #include <filesystem>
 #include <regex>
 
-#include "answer.hpp"
 #include "fit_options.hpp"
 #include "tpm/base/text.hpp"
 #include "tpm/files/json.hpp"
@@ -16,7 +15,6 @@
 #include "tpm/fit/show/fit_answer.hpp"
 #include "tpm/fit/show/fit_csv.hpp"
 #include "tpm/fit/show/fit_report.hpp"
-#include "tpm/fit/show/recording_report.hpp"
 #include "tpmkit/error.hpp"
 
 namespace tpm::app {

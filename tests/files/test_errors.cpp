@@ -26,7 +26,6 @@
 #include "sweep_error_cases.hpp"
 #include "temp_folder.hpp"
 #include "tpm/files/file.hpp"
-#include "tpmkit/curve_file.hpp"
 #include "validation_error_cases.hpp"
 
 using namespace tpm;

@@ -20,7 +20,7 @@
 #include "temp_folder.hpp"
 #include "tpm/base/namespaces.hpp"
 #include "tpm/base/text.hpp"
-#include "tpm/files/check_sum.hpp"
+#include "tpm/files/checksum.hpp"
 #include "tpm/files/file.hpp"
 #include "tpm/files/file_roles.hpp"
 #include "tpm/files/hdf5/hdf5.hpp"
@@ -303,13 +303,13 @@ TEST_CASE(
 TEST_CASE("A check sum is the CRC-32 of ISO 3309, in one go, in parts and joined") {
   const std::string digits = "123456789";
   constexpr std::uint32_t kKnown = 0xcbf43926U;  // its usual check value
-  CHECK(check_sum(digits.data(), digits.size()) == kKnown);
-  CHECK(check_sum(nullptr, 0, kKnown) == kKnown);
+  CHECK(crc32_of(digits.data(), digits.size()) == kKnown);
+  CHECK(crc32_of(nullptr, 0, kKnown) == kKnown);
   for (std::size_t first = 0; first <= digits.size(); ++first) {
-    const std::uint32_t begin = check_sum(digits.data(), first);
-    CHECK(check_sum(digits.data() + first, digits.size() - first, begin) == kKnown);
-    const std::uint32_t end = check_sum(digits.data() + first, digits.size() - first);
-    CHECK(joined_check_sum(begin, end, digits.size() - first) == kKnown);
+    const std::uint32_t begin = crc32_of(digits.data(), first);
+    CHECK(crc32_of(digits.data() + first, digits.size() - first, begin) == kKnown);
+    const std::uint32_t end = crc32_of(digits.data() + first, digits.size() - first);
+    CHECK(joined_crc32(begin, end, digits.size() - first) == kKnown);
   }
 }
 

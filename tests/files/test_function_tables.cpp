@@ -10,7 +10,6 @@
 #include "table_reader.hpp"
 #include "tpm/files/import/column_title.hpp"
 #include "tpm/files/import/header_words.hpp"
-#include "tpmkit/error.hpp"
 
 using namespace tpm;
 using namespace tpm::files;

@@ -15,7 +15,6 @@
 #include "tpm/files/hdf5/hdf5.hpp"
 #include "tpm/files/json.hpp"
 #include "tpm/show/draw.hpp"
-#include "tpmkit/error.hpp"
 
 namespace tpm::files {
 using namespace show;

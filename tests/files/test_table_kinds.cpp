@@ -4,7 +4,6 @@
 
 #include <catch2/catch.hpp>
 #include <cmath>
-#include <functional>
 
 #include "table_reader.hpp"
 #include "tpm/files/clock_text.hpp"
@@ -13,7 +12,6 @@
 #include "tpm/files/import/header_words.hpp"
 #include "tpm/files/import/step_clock.hpp"
 #include "tpm/files/number_style.hpp"
-#include "tpmkit/error.hpp"
 
 using namespace tpm;
 using namespace tpm::files;

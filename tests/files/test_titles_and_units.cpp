@@ -3,7 +3,6 @@
 #include <fmt/format.h>
 
 #include <catch2/catch.hpp>
-#include <cmath>
 #include <string>
 
 #include "refusal.hpp"
@@ -14,7 +13,6 @@
 #include "tpm/files/import/reading_options.hpp"
 #include "tpm/files/import/recording_file.hpp"
 #include "tpm/files/unit_words.hpp"
-#include "tpmkit/error.hpp"
 
 using namespace tpm;
 using namespace tpm::files;

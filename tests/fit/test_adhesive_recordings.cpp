@@ -8,7 +8,6 @@
 #include "fitted_parameter.hpp"
 #include "placed_recordings.hpp"
 #include "tpm/fit/recording/placement.hpp"
-#include "tpm/fit/select/selection.hpp"
 #include "tpmkit/law_model.hpp"
 
 using namespace tpm;

@@ -9,10 +9,8 @@
 #include "one_law.hpp"
 #include "tpm/base/random.hpp"
 #include "tpm/fit/adequacy.hpp"
-#include "tpm/fit/likelihood/load_imposed.hpp"
 #include "tpm/fit/recording/motion_before_load.hpp"
 #include "tpm/fit/recording/placement.hpp"
-#include "tpm/fit/select/fit_adequacy.hpp"
 #include "tpm/fit/select/selection.hpp"
 #include "tpm/fit/spikes_at_rest.hpp"
 

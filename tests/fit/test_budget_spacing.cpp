@@ -1,6 +1,5 @@
 // The budget's line `spacing`: against runs of the two scenes, and only for one material.
 #include <catch2/catch.hpp>
-#include <cmath>
 
 #include "refusal.hpp"
 #include "tpm/fit/predict/error_budget.hpp"

@@ -1,5 +1,4 @@
 // Recordings whose channels do not belong together, whose contact lies in a jump, and cycles.
-#include <fmt/format.h>
 
 #include <algorithm>
 #include <catch2/catch.hpp>

@@ -368,13 +368,12 @@ TEST_CASE("where no rest tells a drift of a strain or a stress, k_inf is not ide
     CHECK_THAT(both->drifting.value(), WithinRel(2000.0, 0.1));
     CHECK_THAT(both->drift_per_s.front(), WithinRel(1e-4, 0.2));
     for (const char* name : {"k1", "tau1"}) {
-      const auto p = std::ranges::find_if(
-          fit.parameters, [&](const ParameterResult& q) { return q.parameter.name == name; });
-      if (p->not_separable) continue;
-      REQUIRE(p->with_drift);
-      const double truth = p->parameter.name == "k1" ? 3000.0 : 5.0;
-      CHECK(p->lower.value_or(0.0) < truth);
-      CHECK(p->upper.value_or(HUGE_VAL) > truth);
+      const ParameterResult& p = find(fit, name);
+      if (p.not_separable) continue;
+      REQUIRE(p.with_drift);
+      const double truth = p.parameter.name == "k1" ? 3000.0 : 5.0;
+      CHECK(p.lower.value_or(0.0) < truth);
+      CHECK(p.upper.value_or(HUGE_VAL) > truth);
     }
   }
   for (const double rest_s : {0.0, 10.0}) {

@@ -4,10 +4,10 @@
 #include <cmath>
 
 #include "placed_recordings.hpp"
+#include "support/fitted_parameter.hpp"
+#include "support/one_law.hpp"
 #include "support/remarks.hpp"
 #include "tpm/fit/adequacy.hpp"
-#include "tpm/fit/recording/unseen_rises.hpp"
-#include "tpm/fit/select/selection.hpp"
 #include "tpm/fit/verdict.hpp"
 
 using namespace tpm;
@@ -18,21 +18,18 @@ using Catch::StartsWith;
 namespace {
 
 FitResult fitted_with(const char* law, const PreparedRecording& recording) {
-  SelectionOptions options;
-  options.laws = {parse_law_name(law, "test")};
-  options.only_listed = true;
-  options.held_out = false;
-  options.setup.starts = 4;
-  options.setup.profiles = true;
-  const Selection s = select_law(std::span(&recording, 1), options);
+  const Selection s = test::select_one(law, recording, test::setup_of(4, true));
   return s.candidates[s.recommended].fit;
 }
 
-const ParameterResult& result_of(const FitResult& fit, const std::string& name) {
-  const auto found = std::ranges::find_if(
-      fit.parameters, [&name](const ParameterResult& p) { return p.parameter.name == name; });
-  REQUIRE(found != fit.parameters.end());
-  return *found;
+/// 10 s at rest: times, and readings of unit noise.
+std::pair<std::vector<double>, std::vector<double>> rest_of(Random& random) {
+  std::pair<std::vector<double>, std::vector<double>> rest;
+  for (int i = 0; i < 100; ++i) {
+    rest.first.push_back(0.1 * i - 10.0);
+    rest.second.push_back(random.normal());
+  }
+  return rest;
 }
 
 bool is_identified(const ParameterResult& p) {
@@ -56,17 +53,16 @@ TEST_CASE("a rest that the amplifier cuts off tells neither zero nor contact", "
   const FitResult cut = fitted_with(
       "linear-1", shown_by(placed, [](std::size_t, double f) { return std::max(f, 0.0); }));
   for (const char* name : {"k_inf", "k1", "contact", "offset"}) {
-    const ParameterResult& p = result_of(cut, name);
+    const ParameterResult& p = find(cut, name);
     INFO(p.summary);
     CHECK_FALSE(is_identified(p));
   }
-  CHECK_THAT(verdict_text(result_of(cut, "k1")),
-             StartsWith("not identified: the zero of the force"));
+  CHECK_THAT(verdict_text(find(cut, "k1")), StartsWith("not identified: the zero of the force"));
   REQUIRE(test::has_remark(cut.remarks, "rest_cut_off"));
   // The same with the noise of the rest in it.
   const FitResult whole =
       fitted_with("linear-1", shown_by(placed, [](std::size_t, double f) { return f; }));
-  CHECK(is_identified(result_of(whole, "k1")));
+  CHECK(is_identified(find(whole, "k1")));
   CHECK_FALSE(test::has_remark(whole.remarks, "rest_cut_off"));
 }
 
@@ -92,9 +88,9 @@ TEST_CASE("readings without a sign leave the coefficients identified, but not th
   placed.rest_s = 20.0;
   const FitResult fit =
       fitted_with("linear-1", shown_by(placed, [](std::size_t, double f) { return std::abs(f); }));
-  CHECK(result_of(fit, "offset").not_separable);
-  CHECK(result_of(fit, "contact").not_separable);
-  CHECK_FALSE(result_of(fit, "k1").not_separable);
+  CHECK(find(fit, "offset").not_separable);
+  CHECK(find(fit, "contact").not_separable);
+  CHECK_FALSE(find(fit, "k1").not_separable);
   REQUIRE(test::has_remark(fit.remarks, "rest_cut_off"));
   test::PlacedTest above = placed;  // by three times its noise: a zero of its own
   above.zero_N = 6e-4;
@@ -129,7 +125,7 @@ TEST_CASE("a power from a contact that nothing tells holds neither stiffness nor
   const double truth_k1 = 45.0 * std::sqrt(2.0 / 3.0);  // at 2 mm
   for (const auto& [name, truth] :
        {std::pair("exponent", 1.5), std::pair("k1", truth_k1), std::pair("offset", 0.0)}) {
-    const ParameterResult& p = result_of(fit, name);
+    const ParameterResult& p = find(fit, name);
     INFO(p.summary);
     const bool holds = p.lower && p.upper && *p.lower <= truth && truth <= *p.upper;
     CHECK((holds || p.verdict != Verdict::identified || p.not_separable));
@@ -164,8 +160,8 @@ TEST_CASE("the fit ends before a gap in which the drive moved", "[zero][rise]") 
   CHECK(unseen.to_s == Approx(20.0));
   REQUIRE(test::has_remark(unseen.remarks, "motion_in_gap"));
   const FitResult fit = fitted_with("linear-1", unseen);
-  CHECK(result_of(fit, "k1").lower.value() < 45.0);
-  CHECK(result_of(fit, "k1").upper.value() > 45.0);
+  CHECK(find(fit, "k1").lower.value() < 45.0);
+  CHECK(find(fit, "k1").upper.value() > 45.0);
   // Nothing moves in the first of these gaps, and in the second the ramp goes on as before.
   CHECK(without(two, 10.01, 18.99).to_s > 50.0);
   const std::vector<Knot> slow{{0.0, 0.0}, {2.0, 0.0}, {22.0, 4e-3}, {60.0, 4e-3}};
@@ -207,11 +203,8 @@ TEST_CASE("a recording that begins under its load is not called counted the othe
 
 TEST_CASE("a ramp that is left out nearly whole is named beside a transient", "[zero][adequacy]") {
   Random random(9);
-  std::vector<double> rest_time, rest, time, reading, residual;
-  for (int i = 0; i < 100; ++i) {
-    rest_time.push_back(0.1 * i - 10.0);
-    rest.push_back(random.normal());
-  }
+  const auto [rest_time, rest] = rest_of(random);
+  std::vector<double> time, reading, residual;
   for (int i = 0; i < 600; ++i) {
     time.push_back(0.1 * i);
     reading.push_back(1000.0 * std::min(i / 61.0, 1.0) + random.normal());
@@ -227,11 +220,8 @@ TEST_CASE("a ramp that is left out nearly whole is named beside a transient", "[
 
 TEST_CASE("a response that ends while the drive goes on is no fluid's", "[zero][adequacy]") {
   Random random(9);
-  std::vector<double> rest_time, rest, time, reading, residual;
-  for (int i = 0; i < 100; ++i) {
-    rest_time.push_back(0.1 * i - 10.0);
-    rest.push_back(random.normal());
-  }
+  const auto [rest_time, rest] = rest_of(random);
+  std::vector<double> time, reading, residual;
   for (int i = 0; i < 400; ++i) {
     const bool broken = i >= 150;
     const double law = 10.0 * std::min(i, 200);
@@ -248,11 +238,8 @@ TEST_CASE("a response that ends while the drive goes on is no fluid's", "[zero][
 
 TEST_CASE("a jump of the readings while the drive rests is named", "[zero][adequacy]") {
   Random random(9);
-  std::vector<double> rest_time, rest, time, reading, residual;
-  for (int i = 0; i < 100; ++i) {
-    rest_time.push_back(0.1 * i - 10.0);
-    rest.push_back(random.normal());
-  }
+  const auto [rest_time, rest] = rest_of(random);
+  std::vector<double> time, reading, residual;
   for (int i = 0; i < 400; ++i) {
     const double jump = i < 150 ? 0.0 : -250.0;
     time.push_back(0.1 * i);

@@ -13,7 +13,6 @@
 #include "statistics_problems.hpp"
 #include "tpm/fit/likelihood/estimated_sigma.hpp"
 #include "tpm/fit/likelihood/noise.hpp"
-#include "tpmkit/error.hpp"
 
 using namespace tpm;
 using namespace tpm::fit;

@@ -15,7 +15,6 @@
 #include "tpm/fit/groups/specimens.hpp"
 #include "tpm/fit/groups/young_moduli.hpp"
 #include "tpm/fit/predict/law_prediction.hpp"
-#include "tpm/fit/select/clipping.hpp"
 #include "tpm/fit/select/fit_adequacy.hpp"
 #include "tpm/fit/select/unloading_test.hpp"
 #include "tpm/fit/verdict.hpp"
@@ -89,9 +88,7 @@ TEST_CASE("where no law tried describes a recording, the laws that were not trie
   trial.defect = Defect::ringing;
   trial.defect_N = 0.1;
   const PreparedRecording recording = prepared_trial(trial);
-  SelectionOptions options;
-  options.laws = {parse_law_name("linear-1", "test"), parse_law_name("linear", "test")};
-  options.only_listed = true;
+  SelectionOptions options = test::only({"linear-1", "linear"});
   options.held_out = false;
   options.setup.profiles = false;
   const Selection classical = select_law(std::span(&recording, 1), options);
@@ -175,9 +172,7 @@ TEST_CASE("a law that another beats decisively holds nothing for identified", "[
                          2e-4 * random.normal());
   }
   const PreparedRecording recording = prepare_recording("slow.csv", r);
-  SelectionOptions options;
-  options.laws = {parse_law_name("linear-1", "test"), parse_law_name("linear-2", "test")};
-  options.only_listed = true;
+  SelectionOptions options = test::only({"linear-1", "linear-2"});
   options.setup.starts = 10;
   const Selection s = select_law(std::span(&recording, 1), options);
   REQUIRE(s.preferred);

@@ -7,11 +7,11 @@
 #include <string>
 #include <utility>
 
+#include "one_law.hpp"
 #include "tpm/base/sized_unit.hpp"
 #include "tpm/base/text.hpp"
 #include "tpm/fit/show/fit_answer.hpp"
 #include "tpm/fit/show/recording_report.hpp"
-#include "tpm/fit/verdict.hpp"
 #include "tpm/fit/waterfall.hpp"
 #include "tpmkit/law_model.hpp"
 
@@ -41,13 +41,8 @@ Recording scaled_press(double scale) {
 }
 
 Selection selected_at_scale(double scale) {
-  SelectionOptions options;
-  for (const char* name : {"linear", "linear-1", "power-1"}) {
-    options.laws.push_back(parse_law_name(name, "test"));
-  }
-  options.only_listed = true;
   const std::vector<PreparedRecording> one{prepare_recording("pressed.csv", scaled_press(scale))};
-  return select_law(one, options);
+  return select_law(one, test::only({"linear", "linear-1", "power-1"}));
 }
 
 auto lines_of(const std::string& text) {

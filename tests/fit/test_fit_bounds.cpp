@@ -6,6 +6,7 @@
 #include <cmath>
 #include <optional>
 
+#include "fitted_parameter.hpp"
 #include "one_law.hpp"
 #include "support/creep_recordings.hpp"
 #include "support/remarks.hpp"
@@ -40,13 +41,6 @@ PreparedRecording pressed_from_the_start(double before, double exponent) {
   return prepare_recording("pressed.csv", r);
 }
 
-const ParameterResult& named(const FitResult& fit, const std::string& name) {
-  for (const ParameterResult& p : fit.parameters) {
-    if (p.parameter.name == name) return p;
-  }
-  throw std::runtime_error(name);
-}
-
 FitResult fitted_power(const PreparedRecording& r, bool widen) {
   const std::vector<PreparedRecording> one{r};
   FitConfig config = recording_config(parse_law_name("power-1", "test"), one, {});
@@ -77,8 +71,8 @@ TEST_CASE("The contact of a recording that begins in contact may lie two depths 
           "[bounds]") {
   const PreparedRecording r = pressed_from_the_start(2e-3, 2.5);
   const FitResult fit = fitted_power(r, true);
-  const ParameterResult& exponent = named(fit, "exponent");
-  const ParameterResult& contact = named(fit, "contact");
+  const ParameterResult& exponent = find(fit, "exponent");
+  const ParameterResult& contact = find(fit, "contact");
   CHECK_FALSE(contact.at_lower_bound);
   CHECK(contact.nuisance);
   // Its bounds are physical: nothing widens them.
@@ -95,7 +89,7 @@ TEST_CASE("The contact of a recording that begins in contact may lie two depths 
 
 TEST_CASE("Automatic bounds of the material are widened, and a note says so", "[bounds]") {
   const FitResult fit = fitted_below_its_tau({});
-  const ParameterResult& tau = named(fit, "tau1");
+  const ParameterResult& tau = find(fit, "tau1");
   REQUIRE(tau.first_bounds);
   CHECK(tau.first_bounds->upper == 0.1);
   CHECK(tau.parameter.upper > 2.0);
@@ -105,7 +99,7 @@ TEST_CASE("Automatic bounds of the material are widened, and a note says so", "[
 
 TEST_CASE("Bounds that could be widened by rounding alone stay, and nothing is said", "[bounds]") {
   const FitResult fit = fitted_below_its_tau(WidestBounds{0.01, 0.1 * (1.0 + 1e-15)});
-  const ParameterResult& tau = named(fit, "tau1");
+  const ParameterResult& tau = find(fit, "tau1");
   CHECK(tau.at_upper_bound);
   CHECK_FALSE(tau.first_bounds);
   CHECK_FALSE(test::has_remark(fit.remarks, "bounds_widened"));
@@ -121,10 +115,10 @@ TEST_CASE("Verdicts that depend on a nuisance parameter on its bound are conditi
   // Touched further away than automatic bounds go.
   const PreparedRecording r = pressed_from_the_start(12e-3, 3.0);
   const FitResult fit = fitted_power(r, true);
-  const ParameterResult& contact = named(fit, "contact");
+  const ParameterResult& contact = find(fit, "contact");
   REQUIRE(contact.at_lower_bound);
   CHECK_THAT(contact.parameter.lower, WithinRel(-6e-3, 1e-9));
-  const ParameterResult& exponent = named(fit, "exponent");
+  const ParameterResult& exponent = find(fit, "exponent");
   REQUIRE(exponent.conditional_on.size() == 1);
   CHECK(exponent.conditional_on.front() == Condition{"contact", false, -6e-3, true});
   CHECK_THAT(exponent.summary, Contains("this holds only with contact at its lower bound -6 mm"));
@@ -151,14 +145,14 @@ TEST_CASE("An interval that a bound of the contact point cuts says so", "[bounds
   const PreparedRecording r = pressed_from_the_start(2e-3, 2.5);
   const std::vector<PreparedRecording> one{r};
   FitConfig config = recording_config(parse_law_name("power-1", "test"), one, {});
-  const double estimate = named(fitted_power(r, true), "contact").estimate;
+  const double estimate = find(fitted_power(r, true), "contact").estimate;
   for (EstimatedParameter& p : config.parameters) {
     p.widest.reset();
     if (p.fit.name == "contact") p.fit.lower = estimate - 1e-6;  // within the interval
   }
   const FitResult fit = run_fit(config, data_sets(one));
-  CHECK_FALSE(named(fit, "contact").at_lower_bound);
-  const ParameterResult& exponent = named(fit, "exponent");
+  CHECK_FALSE(find(fit, "contact").at_lower_bound);
+  const ParameterResult& exponent = find(fit, "exponent");
   REQUIRE(exponent.conditional_on.size() == 1);
   CHECK_FALSE(exponent.conditional_on.front().at_estimate);
   CHECK_THAT(exponent.summary, Contains("its interval ends with contact at its lower bound"));
@@ -192,7 +186,7 @@ TEST_CASE("A profile that fails is not a flat profile", "[bounds]") {
     "starts": {"count": 4, "seed": 0}})",
                                    "test");
   const FitResult fit = run_fit(parse_fit_config(document, "test"), {creep});
-  const ParameterResult& tau = named(fit, "tau1");
+  const ParameterResult& tau = find(fit, "tau1");
   CHECK_THAT(tau.estimate, WithinRel(1.0, 1e-9));
   CHECK(tau.standard_error.value() < 1e-9);
   CHECK(tau.verdict == Verdict::failed);
@@ -232,10 +226,10 @@ TEST_CASE("A rest before contact keeps contact and offset off their bounds", "[b
     }
     const std::vector<PreparedRecording> one{prepare_recording("r.csv", r)};
     const FitResult fit = run_fit(recording_config(spec, one, {}), data_sets(one));
-    on_bound += named(fit, "contact").at_lower_bound ? 1 : 0;
-    CHECK(named(fit, "offset").conditional_on.empty());
-    CHECK(named(fit, "k_inf").conditional_on.empty());
-    CHECK(named(fit, "tau1").conditional_on.empty());
+    on_bound += find(fit, "contact").at_lower_bound ? 1 : 0;
+    CHECK(find(fit, "offset").conditional_on.empty());
+    CHECK(find(fit, "k_inf").conditional_on.empty());
+    CHECK(find(fit, "tau1").conditional_on.empty());
   }
   CHECK(on_bound == 0);
 }
@@ -287,7 +281,7 @@ TEST_CASE("The slack length of a strip has physical bounds, which nothing widens
   CHECK_THAT(slack->fit.lower, WithinRel(1.0 - 2.0 * 0.1, 1e-9));
   CHECK_THAT(slack->fit.upper, WithinRel(1.0 + 0.9 * 0.1, 1e-9));
   const FitResult fit = run_fit(config, data_sets({&r, 1}));
-  CHECK_FALSE(named(fit, "slack_length").first_bounds);
+  CHECK_FALSE(find(fit, "slack_length").first_bounds);
 }
 
 TEST_CASE("The zero of a stress is not moved further than what was read", "[bounds]") {

@@ -8,7 +8,6 @@
 #include "one_law.hpp"
 #include "tpm/base/random.hpp"
 #include "tpm/fit/select/recording_setup.hpp"
-#include "tpm/fit/select/selection.hpp"
 #include "tpmkit/law_model.hpp"
 
 using namespace tpm;

@@ -1,12 +1,10 @@
 // The check of derivatives: correct ones pass, falsified ones fail, and what it cannot do is said.
 #include <catch2/catch.hpp>
 #include <cmath>
-#include <limits>
 
 #include "gradient_check.hpp"
 #include "statistics_problems.hpp"
 #include "tpm/fit/likelihood/experiment_residuals.hpp"
-#include "tpmkit/error.hpp"
 
 using namespace tpm;
 using namespace tpm::fit;

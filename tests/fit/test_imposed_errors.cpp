@@ -4,6 +4,7 @@
 #include <catch2/catch.hpp>
 #include <cmath>
 
+#include "fitted_parameter.hpp"
 #include "one_law.hpp"
 #include "placed_recordings.hpp"
 #include "tpm/fit/select/selection.hpp"
@@ -21,11 +22,6 @@ namespace {
 
 Selection selected_of(const PreparedRecording& recording, const std::string& law, bool profiles) {
   return test::select_one(law, recording, test::setup_of(4, profiles));
-}
-
-const ParameterResult& parameter_of(const FitResult& fit, const std::string& name) {
-  return *std::ranges::find_if(fit.parameters,
-                               [&](const ParameterResult& p) { return p.parameter.name == name; });
 }
 
 /// Kelvin-Voigt, 400 N/m and 6 N s/m, moved by a hand and read at 1 kHz; the depth scatters by 1
@@ -61,7 +57,7 @@ TEST_CASE("noise of the drive does not move the plateau out of its interval", "[
   for (const std::uint64_t seed : {4, 5, 7, 16}) {
     const PreparedRecording recording = prepare_recording("made.csv", moved_by_hand(seed));
     const Selection s = selected_of(recording, "linear-1", true);
-    const ParameterResult& p = parameter_of(s.candidates[s.recommended].fit, "k_inf");
+    const ParameterResult& p = find(s.candidates[s.recommended].fit, "k_inf");
     INFO("seed " << seed);
     CHECK(p.lower.value() < 400.0);
     CHECK(p.upper.value() > 400.0);
@@ -74,7 +70,7 @@ TEST_CASE("an interval that allows for noise of the drive is no wider than its b
   // the interval of k_inf had no lower end.
   const PreparedRecording recording = prepare_recording("made.csv", moved_by_hand(1));
   const Selection s = selected_of(recording, "linear-1", true);
-  const ParameterResult& p = parameter_of(s.candidates[s.recommended].fit, "k_inf");
+  const ParameterResult& p = find(s.candidates[s.recommended].fit, "k_inf");
   REQUIRE((p.lower && p.upper));
   CHECK(*p.lower < 400.0);
   CHECK(*p.upper > 400.0);
@@ -102,7 +98,7 @@ TEST_CASE("a depth recorded in coarse steps leaves the law described, its interv
       CHECK((!fit.noise || fit.noise->phi < 0.9));
       for (const auto& [name, truth] : {std::pair("k1", 45.0), {"tau1", 2.0}}) {
         CAPTURE(name);
-        const ParameterResult& p = parameter_of(fit, name);
+        const ParameterResult& p = find(fit, name);
         if (!p.lower || !p.upper) continue;
         ++closed;
         missing += truth < *p.lower || truth > *p.upper;
@@ -149,23 +145,22 @@ TEST_CASE("a contact that only a power with an exponent of no probe tells is not
   };
   const Selection bent = selected_of(recording_of(true), "power-1", true);
   const FitResult& layer = bent.candidates[bent.recommended].fit;
-  CHECK(parameter_of(layer, "exponent").lower.value() > 2.0);
-  const ParameterResult& far = parameter_of(layer, "contact");
+  CHECK(find(layer, "exponent").lower.value() > 2.0);
+  const ParameterResult& far = find(layer, "contact");
   REQUIRE(far.upper);
   CHECK(*far.upper < -4e-5);  // it was at 0
   CHECK_THAT(verdict_text(far), StartsWith("not identified: contact or a loading"));
   CHECK_THAT(far.summary, Contains("interval without such a loading"));
   // The stiffnesses and the exponent are those of a power from that contact; the time is not.
   for (const char* name : {"k_inf", "k1", "exponent"}) {
-    const ParameterResult& p = parameter_of(layer, name);
+    const ParameterResult& p = find(layer, name);
     CHECK(p.verdict == Verdict::identified);
     CHECK_THAT(verdict_text(p), StartsWith("not identified: contact or a loading"));
     CHECK_THAT(p.summary, Contains("is not identified") && Contains("without such a loading"));
   }
-  CHECK_FALSE(parameter_of(layer, "tau1").not_separable);
+  CHECK_FALSE(find(layer, "tau1").not_separable);
   const Selection straight = selected_of(recording_of(false), "power-1", true);
-  const ParameterResult& near =
-      parameter_of(straight.candidates[straight.recommended].fit, "contact");
+  const ParameterResult& near = find(straight.candidates[straight.recommended].fit, "contact");
   for (const ParameterResult& p : straight.candidates[straight.recommended].fit.parameters) {
     CHECK_FALSE(p.not_separable);
   }

@@ -11,7 +11,6 @@
 #include "tpm/fit/autoregressive.hpp"
 #include "tpm/fit/confirmation.hpp"
 #include "tpm/fit/noise_of_estimates.hpp"
-#include "tpm/fit/outliers.hpp"
 #include "tpm/fit/select/fixed_times.hpp"
 #include "tpm/fit/select/gate.hpp"
 #include "tpm/fit/select/material_function.hpp"

@@ -1,8 +1,6 @@
 // A law file holds what is needed to predict the recordings that the law was fitted to: the slack
 // length of the specimen, and contact and offset of each recording.
-#include <algorithm>
 #include <catch2/catch.hpp>
-#include <cmath>
 #include <string>
 #include <vector>
 

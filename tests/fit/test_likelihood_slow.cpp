@@ -11,10 +11,8 @@
 #include "gradient_check.hpp"
 #include "support/remarks.hpp"
 #include "tpm/base/random.hpp"
-#include "tpm/files/file.hpp"
 #include "tpm/fit/fit.hpp"
 #include "tpm/fit/likelihood/experiment_refit.hpp"
-#include "tpmkit/error.hpp"
 #include "tpmkit/law_model.hpp"
 
 using namespace tpm;

@@ -3,10 +3,10 @@
 #include <catch2/catch.hpp>
 #include <cmath>
 
+#include "support/one_law.hpp"
 #include "support/remarks.hpp"
 #include "tpm/base/random.hpp"
 #include "tpm/fit/design/recovery.hpp"
-#include "tpm/fit/select/selection.hpp"
 
 using namespace tpm;
 using namespace tpm::fit;
@@ -117,10 +117,7 @@ TEST_CASE("24,000 samples without noise give back the parameters that made them"
 }
 
 TEST_CASE("a long recording goes through select and the prediction of its second half") {
-  SelectionOptions options;
-  options.laws = {parse_law_name("linear-1", "test")};
-  options.only_listed = true;
-  const Selection s = select_law(whole_record(), options);
+  const Selection s = select_law(whole_record(), test::only({"linear-1"}));
   const Candidate& chosen = s.candidates[s.recommended];
   CHECK(s.samples > 20'000);
   REQUIRE(chosen.held_out.size() == 1);

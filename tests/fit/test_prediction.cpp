@@ -11,7 +11,6 @@
 #include "tpm/files/blocks/law_json.hpp"
 #include "tpm/fit/fitted_law.hpp"
 #include "tpm/fit/predict/law_prediction.hpp"
-#include "tpm/fit/prediction.hpp"
 #include "tpm/organ/scene/protocol_file.hpp"
 #include "tpmkit/law_file.hpp"
 #include "tpmkit/law_model.hpp"

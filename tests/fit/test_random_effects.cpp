@@ -2,14 +2,12 @@
 #include <boost/math/distributions/students_t.hpp>
 #include <catch2/catch.hpp>
 #include <cmath>
-#include <limits>
 
 #include "expected_values.hpp"
 #include "statistics_problems.hpp"
 #include "tpm/fit/groups/random_effects.hpp"
 #include "tpm/fit/verdict.hpp"
 #include "tpm/fit/waterfall.hpp"
-#include "tpmkit/error.hpp"
 
 using namespace tpm;
 using namespace tpm::fit;

@@ -6,6 +6,7 @@
 #include <numbers>
 
 #include "fitted_parameter.hpp"
+#include "one_law.hpp"
 #include "run_in.hpp"
 #include "temp_folder.hpp"
 #include "tpm/base/random.hpp"
@@ -151,10 +152,8 @@ TEST_CASE("A strain or a stress that is kept makes a modulus or a compliance", "
   CHECK(g->kind() == "relaxation modulus");
   CHECK(j->kind() == "creep compliance");
   CHECK_THAT(g->read_as, Contains("stress over the strain that is kept"));
-  SelectionOptions options;
+  SelectionOptions options = test::only({"linear-1"});
   options.setup.starts = 6;
-  options.laws = {parse_law_name("linear-1", "test")};
-  options.only_listed = true;
   // 20/0.02 and 60/0.02 Pa; J = 1e-3 - 0.75e-3 exp(-t/8) is the same solid.
   for (const auto& function : {*g, *j}) {
     const Selection s = select_law(function, options);
@@ -249,24 +248,16 @@ TEST_CASE("Branches keep their names in fits and profiles", "[rheometer]") {
     text += fmt::format("{:.12g},{:.12g}\n", t, g * (1.0 + 0.02 * random.normal()));
   }
   write_file(folder / "g.csv", text);
-  SelectionOptions options;
-  options.laws = {parse_law_name("linear-2", "test")};
-  options.only_listed = true;
-  const Selection s = select_law(*find_material_function(folder / "g.csv", {}), options);
+  const Selection s =
+      select_law(*find_material_function(folder / "g.csv", {}), test::only({"linear-2"}));
   const FitResult& fit = s.candidates[s.recommended].fit;
   CHECK(estimate_of(fit, "tau1") < estimate_of(fit, "tau2"));
   CHECK(fit.minima.front().low[3] < 2.0);
-  const auto parameter = [&](const char* name) -> const ParameterResult& {
-    for (const ParameterResult& p : fit.parameters) {
-      if (p.parameter.name == name) return p;
-    }
-    throw std::runtime_error(name);
-  };
   // Each interval holds its own true value and not the other's.
-  CHECK(*parameter("tau1").upper < 4.0);
-  CHECK(*parameter("tau2").lower > 0.5);
-  CHECK(parameter("tau1").profile.connected);
-  CHECK(parameter("tau2").profile.connected);
+  CHECK(*find(fit, "tau1").upper < 4.0);
+  CHECK(*find(fit, "tau2").lower > 0.5);
+  CHECK(find(fit, "tau1").profile.connected);
+  CHECK(find(fit, "tau2").profile.connected);
 
   const ExchangeOrder order(fit.config);
   std::vector<double> natural{500.0, 1.0, 2.0, 7.0, 3.0};  // k_inf, k1, k2, tau1, tau2

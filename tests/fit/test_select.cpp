@@ -43,12 +43,7 @@ Recording simulated_press(const std::string& law, const std::vector<double>& val
 }
 
 SelectionOptions few_laws() {
-  SelectionOptions options;
-  for (const char* name : {"linear", "linear-1", "linear-2", "power", "power-1", "power-2"}) {
-    options.laws.push_back(parse_law_name(name, "test"));
-  }
-  options.only_listed = true;
-  return options;
+  return test::only({"linear", "linear-1", "linear-2", "power", "power-1", "power-2"});
 }
 
 }  // namespace
@@ -270,9 +265,7 @@ Recording sampled(const std::string& law, const std::vector<double>& values, dou
 }
 
 Selection selected_among(const Recording& r, std::initializer_list<const char*> laws) {
-  SelectionOptions options;
-  for (const char* name : laws) options.laws.push_back(parse_law_name(name, "test"));
-  options.only_listed = true;
+  SelectionOptions options = test::only(laws);
   options.setup.profiles = false;
   const std::vector<PreparedRecording> one{prepare_recording("r.csv", r)};
   return select_law(one, options);

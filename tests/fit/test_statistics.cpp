@@ -6,16 +6,13 @@
 #include <catch2/catch.hpp>
 #include <cmath>
 #include <ctime>
-#include <limits>
 
 #include "expected_values.hpp"
 #include "statistics_problems.hpp"
 #include "tpm/fit/likelihood/correlation.hpp"
-#include "tpm/fit/likelihood/estimated_sigma.hpp"
 #include "tpm/fit/likelihood/experiment_residuals.hpp"
 #include "tpm/fit/prediction.hpp"
 #include "tpm/fit/verdict.hpp"
-#include "tpmkit/error.hpp"
 
 using namespace tpm;
 using namespace tpm::fit;

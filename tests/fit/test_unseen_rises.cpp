@@ -1,6 +1,5 @@
 // Rises of the drive that the samples do not resolve: steps, staircases, and ramps of few samples.
 #include <catch2/catch.hpp>
-#include <cmath>
 
 #include "driven_solid.hpp"
 #include "tpm/fit/likelihood/delayed_rise.hpp"

@@ -6,7 +6,6 @@
 
 #include "refusal.hpp"
 #include "support/remarks.hpp"
-#include "tpm/base/distributions.hpp"
 #include "validation_studies.hpp"
 
 namespace tpm::fit {

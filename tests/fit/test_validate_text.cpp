@@ -2,7 +2,6 @@
 #include <fmt/format.h>
 
 #include <catch2/catch.hpp>
-#include <cmath>
 
 #include "quiet_recordings.hpp"
 #include "refusal.hpp"

@@ -13,7 +13,7 @@
 #include "refusal.hpp"
 #include "temp_folder.hpp"
 #include "tpm/base/random.hpp"
-#include "tpm/files/check_sum.hpp"
+#include "tpm/files/checksum.hpp"
 #include "tpm/files/file.hpp"
 #include "tpm/haptics/session/recording.hpp"
 #include "tpm/haptics/session/recording_export.hpp"
@@ -76,7 +76,7 @@ std::string bytes_of(const Number& number) {
 }
 
 std::uint32_t sum_of(std::uint32_t number, const std::string& text) {
-  return check_sum(text.data(), text.size(), check_sum(&number, sizeof number));
+  return crc32_of(text.data(), text.size(), crc32_of(&number, sizeof number));
 }
 
 std::string text_bytes(const std::string& text) {

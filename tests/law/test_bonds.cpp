@@ -4,7 +4,6 @@
 
 #include <algorithm>
 #include <catch2/catch.hpp>
-#include <cmath>
 
 #include "expected_values.hpp"
 #include "star_stiffness.hpp"

@@ -11,7 +11,6 @@
 #include "tpm/law/relaxation/mittag_leffler.hpp"
 #include "tpm/law/relaxation/relaxation_filter.hpp"
 #include "tpm/organ/balance/inertial.hpp"
-#include "tpm/organ/body/liver.hpp"
 #include "tpm/organ/bonds/lowest_mode.hpp"
 #include "tpm/organ/scene/scene.hpp"
 #include "tpmkit/error.hpp"

@@ -10,7 +10,6 @@
 #include "step_response.hpp"
 #include "tpm/files/file.hpp"
 #include "tpmkit/frequency_response.hpp"
-#include "tpmkit/law_file.hpp"
 #include "tpmkit/law_model.hpp"
 
 using namespace tpm;

@@ -1,5 +1,6 @@
 #pragma once
-// The fit of one law to one recording, as tpm fit --laws NAME makes it.
+// The fit of few laws, as tpm fit --laws NAME makes it.
+#include <initializer_list>
 #include <span>
 #include <string>
 #include <utility>
@@ -16,12 +17,18 @@ inline fit::SetupOptions setup_of(std::size_t starts, bool profiles) {
   return setup;
 }
 
+/// A choice among these laws alone.
+inline fit::SelectionOptions only(std::initializer_list<const char*> laws) {
+  fit::SelectionOptions options;
+  for (const char* law : laws) options.laws.push_back(parse_law_name(law, "test"));
+  options.only_listed = true;
+  return options;
+}
+
 /// The choice with this law alone; nothing is held out.
 inline fit::Selection select_one(const std::string& law, const fit::PreparedRecording& recording,
                                  fit::SetupOptions setup = {}) {
-  fit::SelectionOptions options;
-  options.laws = {parse_law_name(law, "test")};
-  options.only_listed = true;
+  fit::SelectionOptions options = only({law.c_str()});
   options.held_out = false;
   options.setup = std::move(setup);
   return fit::select_law(std::span(&recording, 1), options);

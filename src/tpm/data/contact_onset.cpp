@@ -1,7 +1,6 @@
 #include "tpm/data/contact_onset.hpp"
 
 #include <algorithm>
-#include <cmath>
 
 #include "tpm/base/median.hpp"
 #include "tpm/base/namespaces.hpp"

@@ -1,8 +1,10 @@
 #include "tpm/files/checksum.hpp"
 
 #include <fcntl.h>
+#include <libdeflate.h>
 #include <sys/stat.h>
 #include <unistd.h>
+#include <zlib.h>
 
 #include <algorithm>
 #include <bit>
@@ -13,20 +15,19 @@
 #include <vector>
 
 #include "tpm/base/namespaces.hpp"
-#include "tpm/files/check_sum.hpp"
 #include "tpm/files/file.hpp"
 #include "tpm/work/parallel.hpp"
 
 namespace tpm::files {
 namespace {
 
-static_assert(std::endian::native == std::endian::little, "check sums hold little-endian numbers");
+static_assert(std::endian::native == std::endian::little, "checksums hold little-endian numbers");
 
 constexpr std::string_view kChecksumMagic = "TPMSEAL1";
 
 struct CheckSum {
   char magic[8];
-  std::uint64_t size;  ///< of what the check sum covers
+  std::uint64_t size;  ///< of what the checksum covers
   std::uint32_t crc;
   std::uint32_t nothing;
 };
@@ -41,7 +42,7 @@ std::optional<std::uint32_t> crc_of_stretch(int file, std::uint64_t from, std::u
   while (from < to) {
     const std::uint64_t part = std::min(to - from, kPiece);
     if (pread_all(file, bytes.data(), part, from) != part) return std::nullopt;
-    crc = check_sum(bytes.data(), static_cast<std::size_t>(part), crc);
+    crc = crc32_of(bytes.data(), static_cast<std::size_t>(part), crc);
     from += part;
   }
   return crc;
@@ -57,12 +58,24 @@ std::optional<std::uint32_t> crc_of(int file, std::uint64_t size) {
   std::uint32_t whole = 0;
   for (std::size_t i = 0; i < parts.size(); ++i) {
     if (!parts[i]) return std::nullopt;
-    whole = joined_check_sum(whole, *parts[i], end_of(i) - i * kReadAtOnce);
+    whole = joined_crc32(whole, *parts[i], end_of(i) - i * kReadAtOnce);
   }
   return whole;
 }
 
 }  // namespace
+
+// The same sum as zlib's, several times as fast: every row of a recording is summed.
+std::uint32_t crc32_of(const void* bytes, std::size_t size, std::uint32_t before) {
+  if (size == 0) return before;  // there may be no bytes to point to
+  return libdeflate_crc32(before, bytes, size);
+}
+
+std::uint32_t joined_crc32(std::uint32_t first, std::uint32_t second,
+                           std::uint64_t size_of_second) {
+  return static_cast<std::uint32_t>(
+      crc32_combine(first, second, static_cast<z_off_t>(size_of_second)));
+}
 
 bool write_checksum(int descriptor, std::uint64_t size) {
   CheckSum sum{{}, size, 0, 0};

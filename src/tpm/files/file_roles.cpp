@@ -11,7 +11,6 @@
 #include <system_error>
 #include <utility>
 
-#include "tpm/base/text.hpp"
 #include "tpm/files/file.hpp"
 #include "tpm/files/files_read.hpp"
 #include "tpm/files/origin_mark.hpp"

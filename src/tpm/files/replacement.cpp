@@ -10,7 +10,7 @@
 #include <utility>
 #include <vector>
 
-#include "tpm/files/check_sum.hpp"
+#include "tpm/files/checksum.hpp"
 #include "tpm/files/file.hpp"
 #include "tpm/files/file_roles.hpp"
 
@@ -27,7 +27,7 @@ constexpr std::size_t kRoomForEnding = 24;
 std::string temporary_beginning(const fs::path& target) {
   const std::string name = target.filename().string();
   if (name.size() + kRoomForEnding <= kLongestName) return name + ".part.";
-  return fmt::format(".tpm-{:08x}.part.", check_sum(name.data(), name.size()));
+  return fmt::format(".tpm-{:08x}.part.", crc32_of(name.data(), name.size()));
 }
 
 fs::path folder_of(const fs::path& target) {

@@ -9,7 +9,7 @@
 #include <cstring>
 #include <optional>
 
-#include "tpm/files/check_sum.hpp"
+#include "tpm/files/checksum.hpp"
 #include "tpm/files/file.hpp"
 #include "tpm/files/file_roles.hpp"
 #include "tpm/files/replacement.hpp"
@@ -25,7 +25,7 @@ constexpr std::uint32_t kClosing = 0xffffffffU;  // in place of a row's number
 constexpr std::size_t kBlock = 1U << 16U;
 
 std::uint32_t crc_of(const void* bytes, std::size_t size, std::uint32_t number = 0) {
-  return check_sum(bytes, size, check_sum(&number, sizeof number));
+  return crc32_of(bytes, size, crc32_of(&number, sizeof number));
 }
 
 void put(std::vector<std::byte>& to, const void* bytes, std::size_t size) {
@@ -111,7 +111,7 @@ void RowLogWriter::append(const void* row) {
   const std::size_t begin = kept_.size();
   put_number(kept_, rows_);
   put(kept_, row, row_bytes_);
-  put_number(kept_, check_sum(kept_.data() + begin, kept_.size() - begin));  // as crc_of()
+  put_number(kept_, crc32_of(kept_.data() + begin, kept_.size() - begin));  // as crc_of()
   ++rows_;
   if (kept_.size() >= kBlock) flush();
 }

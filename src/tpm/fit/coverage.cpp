@@ -3,7 +3,6 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <cmath>
 
 #include "tpm/base/distributions.hpp"
 #include "tpm/base/random.hpp"

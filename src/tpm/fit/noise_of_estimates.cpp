@@ -11,7 +11,6 @@
 #include "tpm/base/distributions.hpp"
 #include "tpm/base/namespaces.hpp"
 #include "tpm/base/text.hpp"
-#include "tpm/fit/adequacy.hpp"
 #include "tpm/fit/autoregressive.hpp"
 #include "tpm/fit/likelihood/correlation.hpp"
 #include "tpm/fit/likelihood/experiment_residuals.hpp"

@@ -5,7 +5,6 @@
 #include <algorithm>
 #include <cmath>
 
-#include "tpm/base/text.hpp"
 #include "tpm/fit/likelihood/quantum.hpp"
 #include "tpm/fit/spikes_at_rest.hpp"
 

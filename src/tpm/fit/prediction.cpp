@@ -2,8 +2,6 @@
 
 #include <fmt/format.h>
 
-#include <cmath>
-
 #include "tpmkit/error.hpp"
 
 namespace tpm::fit {

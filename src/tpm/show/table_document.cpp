@@ -4,7 +4,11 @@
 #include <utf8.h>
 
 #include <algorithm>
+#include <cmath>
 #include <numeric>
+
+#include "tpm/base/namespaces.hpp"
+#include "tpm/base/text.hpp"
 
 namespace tpm::show {
 namespace {
@@ -173,6 +177,20 @@ std::string csv_line(const std::vector<std::string>& cells) {
     line += '"';
   }
   return line + "\n";
+}
+
+std::string numbers_csv(const NumberColumns& columns, int digits) {
+  std::vector<std::string> cells;
+  for (const auto& column : columns) cells.push_back(column.first);
+  std::string text = csv_line(cells);
+  for (std::size_t row = 0; row < columns.front().second.size(); ++row) {
+    for (std::size_t c = 0; c < columns.size(); ++c) {
+      const double number = columns[c].second[row];
+      cells[c] = std::isfinite(number) ? significant(number, digits) : "";
+    }
+    text += csv_line(cells);
+  }
+  return text;
 }
 
 std::string wrapped(std::string_view text, std::size_t width, std::size_t indent,

@@ -1,6 +1,8 @@
 #pragma once
+#include <span>
 #include <string>
 #include <string_view>
+#include <utility>
 #include <vector>
 
 namespace tpm::show {
@@ -35,6 +37,12 @@ enum class TableStyle { text, markdown, latex };
 
 /// One CSV line (RFC 4180 quoting) with a line feed.
 [[nodiscard]] std::string csv_line(const std::vector<std::string>& cells);
+
+/// Names of columns and their numbers, of the same length; the numbers are not copied.
+using NumberColumns = std::vector<std::pair<std::string, std::span<const double>>>;
+
+/// CSV of columns of numbers; a cell without a finite number is empty.
+[[nodiscard]] std::string numbers_csv(const NumberColumns& columns, int digits);
 
 /// Breaks text into lines of at most `width` columns at spaces, each after the first indented.
 /// @param column where the first line starts

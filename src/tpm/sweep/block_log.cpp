@@ -12,7 +12,7 @@
 #include <cstring>
 #include <utility>
 
-#include "tpm/files/check_sum.hpp"
+#include "tpm/files/checksum.hpp"
 #include "tpm/files/file.hpp"
 #include "tpm/files/file_roles.hpp"
 #include "tpm/files/require_exists.hpp"
@@ -91,8 +91,8 @@ std::string log_record(const CellBlock& block) {
   std::copy(kRecordMagic.begin(), kRecordMagic.end(), head.magic);
   head.number = block.number;
   head.size = bytes.size() - sizeof head;
-  head.crc_of_payload = check_sum(bytes.data() + sizeof head, head.size);
-  head.crc_of_head = check_sum(&head, sizeof head - sizeof head.crc_of_head);
+  head.crc_of_payload = crc32_of(bytes.data() + sizeof head, head.size);
+  head.crc_of_head = crc32_of(&head, sizeof head - sizeof head.crc_of_head);
   std::memcpy(bytes.data(), &head, sizeof head);
   return bytes;
 }
@@ -177,12 +177,12 @@ bool BlockLog::record_at(std::uint64_t offset, std::uint64_t& number, std::strin
   if (!read_at(offset, bytes, sizeof head)) return false;
   std::memcpy(&head, bytes.data(), sizeof head);
   if (std::string_view(head.magic, sizeof head.magic) != kRecordMagic ||
-      head.crc_of_head != check_sum(&head, sizeof head - sizeof head.crc_of_head) ||
+      head.crc_of_head != crc32_of(&head, sizeof head - sizeof head.crc_of_head) ||
       head.size > kLargestRecord || head.number >= place_.size()) {
     return false;
   }
   if (!read_at(offset + sizeof head, payload, head.size) ||
-      check_sum(payload.data(), payload.size()) != head.crc_of_payload) {
+      crc32_of(payload.data(), payload.size()) != head.crc_of_payload) {
     return false;
   }
   number = head.number;

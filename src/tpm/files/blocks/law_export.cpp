@@ -3,7 +3,6 @@
 #include <fmt/format.h>
 
 #include <array>
-#include <cmath>
 
 #include "tpm/base/enum_names.hpp"
 #include "tpm/base/text.hpp"

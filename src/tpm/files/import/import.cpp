@@ -1,7 +1,6 @@
 #include "tpm/files/import/import.hpp"
 
 #include <fmt/format.h>
-#include <fmt/ranges.h>
 #include <utf8.h>
 
 #include <algorithm>

@@ -10,7 +10,6 @@
 #include <utility>
 
 #include "tpm/base/namespaces.hpp"
-#include "tpm/base/text.hpp"
 #include "tpm/base/time_range.hpp"
 #include "tpm/files/hdf5/hdf5_members.hpp"
 #include "tpmkit/error.hpp"

@@ -1,6 +1,5 @@
 #include "tpm/files/import/refused_words.hpp"
 
-#include <algorithm>
 #include <array>
 
 namespace tpm::files {

@@ -5,7 +5,6 @@
 #include <algorithm>
 #include <array>
 
-#include "tpm/base/text.hpp"
 #include "tpm/files/clock_text.hpp"
 #include "tpm/files/number_style.hpp"
 #include "tpmkit/error.hpp"

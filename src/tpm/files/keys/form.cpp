@@ -5,7 +5,6 @@
 #include <algorithm>
 #include <cmath>
 #include <regex>
-#include <set>
 #include <stdexcept>
 
 #include "tpm/base/lists.hpp"

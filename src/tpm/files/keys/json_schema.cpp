@@ -5,12 +5,10 @@
 #include <cctype>
 #include <cmath>
 #include <stdexcept>
-#include <string_view>
 
 #include "tpm/base/namespaces.hpp"
 #include "tpm/base/quantity_pattern.hpp"
 #include "tpm/base/quantity_text.hpp"
-#include "tpm/base/text.hpp"
 #include "tpm/files/keys/file_kind.hpp"
 
 namespace tpm::files {

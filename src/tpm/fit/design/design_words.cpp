@@ -2,13 +2,11 @@
 
 #include <fmt/format.h>
 
-#include <algorithm>
 #include <cmath>
 
 #include "tpm/base/quantity_text.hpp"
 #include "tpm/base/sized_unit.hpp"
 #include "tpm/base/text.hpp"
-#include "tpm/fit/fit.hpp"
 
 namespace tpm::fit {
 namespace {

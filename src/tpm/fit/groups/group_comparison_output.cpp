@@ -1,13 +1,13 @@
 // Declared in tpm/fit/groups/group_comparison.hpp.
 #include <fmt/format.h>
 
-#include <algorithm>
 #include <cmath>
 
 #include "tpm/base/namespaces.hpp"
 #include "tpm/base/text.hpp"
 #include "tpm/files/blocks/law_json.hpp"
 #include "tpm/fit/groups/group_comparison.hpp"
+#include "tpm/fit/show/fit_cells.hpp"
 #include "tpm/show/json_table_csv.hpp"
 
 namespace tpm::fit {
@@ -55,10 +55,6 @@ Json quantity_json(const GroupComparison& c, const ComparedQuantity& q) {
   return j;
 }
 
-std::string p_text(double p) {
-  return p < 1e-4 ? significant(p, 2) : fixed(p, 4);
-}
-
 std::string with_interval(double value, double lower, double upper) {
   return fmt::format("{} ({} .. {})", significant(value, 4), significant(lower, 4),
                      significant(upper, 4));
@@ -84,11 +80,12 @@ std::string line_of(const ComparedQuantity& q, bool tested) {
   const GroupDifference& d = *q.difference;
   const double unit = is_ratio(q) ? 1.0 : q.parameter.unit.to_si;
   const auto shown = [&](double theta) { return shown_difference(q, theta) / unit; };
-  text += fmt::format("{:<26} {:<9} {}",
-                      fmt::format("{}{}", is_ratio(q) ? "x " : "+ ",
-                                  with_interval(shown(d.difference), shown(d.interval.lower),
-                                                shown(d.interval.upper))),
-                      p_text(d.p_value), tested ? p_text(q.p_holm) : std::string("as its parts"));
+  text += fmt::format(
+      "{:<26} {:<9} {}",
+      fmt::format(
+          "{}{}", is_ratio(q) ? "x " : "+ ",
+          with_interval(shown(d.difference), shown(d.interval.lower), shown(d.interval.upper))),
+      probability(d.p_value), tested ? probability(q.p_holm) : std::string("as its parts"));
   const int left_out = q.left_out[0] + q.left_out[1];
   if (left_out > 0) text += fmt::format("  left out: {}", left_out);
   if (const std::string doubt = doubt_of(q); !doubt.empty()) text += "  ! " + doubt;

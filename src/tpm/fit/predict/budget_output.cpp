@@ -1,10 +1,12 @@
 // Declared in tpm/fit/predict/error_budget.hpp.
-// Output of a budget: JSON, terminal, CSV.
+// Output of a budget: JSON, terminal, short answer, CSV.
 #include <fmt/format.h>
 
+#include "tpm/base/sized_unit.hpp"
 #include "tpm/base/text.hpp"
 #include "tpm/fit/predict/error_budget.hpp"
 #include "tpm/plan/perception.hpp"
+#include "tpm/show/result_table.hpp"
 
 namespace tpm::fit {
 namespace {
@@ -28,28 +30,51 @@ std::string in_percent(double part) {
   return significant(100.0 * part, 3);
 }
 
+const ResultTable<BudgetLine>& line_table() {
+  using Row = BudgetLine;
+  using Of = ResultColumn<Row>;
+  const auto kind = [](const Row& line) { return budget_kind_name(line.kind); };
+  const auto way = [](const Row& l) { return Cell{fmt::format("{} -> {}", l.from, l.to)}; };
+  const auto compared = [](const Row& line) { return line.largest >= kLeastLine; };
+  const auto small = [compared](const Row& l) { return Cell{compared(l) ? "" : "(below 0.1 %)"}; };
+  static const ResultTable<Row> table(
+      {Of("name", &Row::name).shown("line", -16), Of("kind", kind).shown("kind", -12),
+       Of("from", &Row::from).shown("from -> to", -24).in_words(way), Of("to", &Row::to),
+       Of("largest", &Row::largest).shown("largest", 9, 0.01, 3),
+       Of("largest_at_s", &Row::largest_at_s), Of("rms", &Row::rms).shown("rms", 9, 0.01, 3),
+       Of("compared", compared).shown("").in_words(small)});
+  return table;
+}
+
+/// Each sum of the lines, in its words.
+std::vector<std::pair<std::string, double>> sums_of(const ErrorBudget& b, bool with_draws) {
+  std::vector<std::pair<std::string, double>> sums{{"largest sum of all lines", b.total}};
+  if (b.random) {
+    sums.emplace_back(
+        fmt::format("parameters, {} % band{}", in_percent(b.random->level),
+                    with_draws ? fmt::format(" from {} drawn laws", b.random->samples) : ""),
+        b.random->largest);
+  }
+  if (b.instrument) {
+    sums.emplace_back(
+        fmt::format("instrument {}, {} %", b.instrument->id, in_percent(b.instrument->level)),
+        b.instrument->largest);
+  }
+  sums.emplace_back(b.instrument ? "all in quadrature" : "both in quadrature", b.combined);
+  return sums;
+}
+
 }  // namespace
 
 Json to_json(const ErrorBudget& b) {
   const auto stored = [](double value) { return rounded(value); };
-  Json stages = Json::array(), lines = Json::array();
-  for (const BudgetStage& stage : b.stages) {
-    const Json force = array_json(stage.force_N, stored);
-    stages.push_back({{"name", stage.name}, {"summary", stage.summary}, {"force_N", force}});
-  }
-  for (const BudgetLine& line : b.lines) {
-    lines.push_back({{"name", line.name},
-                     {"kind", budget_kind_name(line.kind)},
-                     {"from", line.from},
-                     {"to", line.to},
-                     {"largest", stored(line.largest)},
-                     {"largest_at_s", stored(line.largest_at_s)},
-                     {"rms", stored(line.rms)},
-                     {"compared", line.largest >= kLeastLine}});
-  }
+  const auto stage = [&](const BudgetStage& s) {
+    return Json{
+        {"name", s.name}, {"summary", s.summary}, {"force_N", array_json(s.force_N, stored)}};
+  };
   Json json{{"title", b.title},
             {"peak_N", stored(b.peak_N)},
-            {"lines", lines},
+            {"lines", line_table().list(b.lines)},
             {"total", stored(b.total)},
             {"not_closed", b.not_closed}};
   if (b.random) {
@@ -69,35 +94,17 @@ Json to_json(const ErrorBudget& b) {
   json["sentences"] = remarks_json(b.sentences);
   json["remarks"] = remarks_json(b.remarks);
   json["time_s"] = b.time_s;
-  json["stages"] = stages;
+  json["stages"] = array_json(b.stages, stage);
   return json;
 }
 
 std::string to_terminal_text(const ErrorBudget& b) {
-  std::string text =
-      fmt::format("{}, peak {} N; in % of it\n\n{:<16} {:<12} {:<24} {:>9} {:>9}\n", b.title,
-                  significant(b.peak_N, 4), "line", "kind", "from -> to", "largest", "rms");
-  for (const BudgetLine& line : b.lines) {
-    text +=
-        fmt::format("{:<16} {:<12} {:<24} {:>9} {:>9}{}\n", line.name, budget_kind_name(line.kind),
-                    fmt::format("{} -> {}", line.from, line.to), in_percent(line.largest),
-                    in_percent(line.rms), line.largest < kLeastLine ? "  (below 0.1 %)" : "");
+  std::string text = fmt::format("{}, peak {} N; in % of it\n\n{}", b.title,
+                                 significant(b.peak_N, 4), line_table().text(b.lines));
+  for (const auto& [words, part] : sums_of(b, true)) {
+    text += fmt::format("{:<54} {:>9}\n", words, in_percent(part));
   }
-  text += fmt::format("{:<54} {:>9}\n", "largest sum of all lines", in_percent(b.total));
-  if (b.random) {
-    text += fmt::format("{:<54} {:>9}\n",
-                        fmt::format("parameters, {} % band from {} drawn laws",
-                                    significant(100.0 * b.random->level, 3), b.random->samples),
-                        in_percent(b.random->largest));
-  }
-  if (b.instrument) {
-    text += fmt::format("{:<54} {:>9}\n",
-                        fmt::format("instrument {}, {} %", b.instrument->id,
-                                    significant(100.0 * b.instrument->level, 3)),
-                        in_percent(b.instrument->largest));
-  }
-  text += fmt::format("{:<54} {:>9}\n\n", b.instrument ? "all in quadrature" : "both in quadrature",
-                      in_percent(b.combined));
+  text += "\n";
   for (const Remark& sentence : b.sentences) text += sentence.text + "\n";
   text += "\njust noticeable differences:";
   for (const Json& t : thresholds()) {
@@ -109,23 +116,40 @@ std::string to_terminal_text(const ErrorBudget& b) {
   return text;
 }
 
-std::string to_csv(const ErrorBudget& b) {
-  std::string text = "time_s";
-  for (const BudgetStage& stage : b.stages) text += fmt::format(",{}_N", stage.name);
-  for (const BudgetLine& line : b.lines) text += fmt::format(",line_{}_N", line.name);
-  text += "\n";
-  constexpr int kDigits = 12;
-  for (std::size_t i = 0; i < b.time_s.size(); ++i) {
-    text += significant(b.time_s[i], kDigits);
-    for (const BudgetStage& stage : b.stages) {
-      text += fmt::format(",{}", significant(stage.force_N[i], kDigits));
-    }
-    for (const BudgetLine& line : b.lines) {
-      text += fmt::format(",{}", significant(line.difference_N[i], kDigits));
-    }
-    text += "\n";
+ShortAnswer short_answer(const ErrorBudget& b) {
+  const auto percent = [](double part) { return in_percent(part) + " %"; };
+  ShortAnswer answer;
+  answer.conclusion = remark_texts(b.sentences);
+  answer.conclusion.insert(
+      answer.conclusion.begin(),
+      fmt::format("{}: peak {}", b.title, sized_text(Dimension::force, b.peak_N, 4)));
+  answer.head = {
+      fmt::format("{:<40} {:>12} {:>12}", "changed by, in parts of the peak", "largest", "rms")};
+  for (const BudgetLine& line : b.lines) {
+    answer.rows.push_back(fmt::format(
+        "{:<40} {:>12} {:>12}{}", fmt::format("{} ({})", line.name, budget_kind_name(line.kind)),
+        percent(line.largest), percent(line.rms),
+        line.largest < kLeastLine ? "  (below 0.1 %)" : ""));
   }
-  return text;
+  for (const auto& [words, part] : sums_of(b, false)) {
+    answer.limits.push_back(fmt::format("{:<40} {:>12}", words, percent(part)));
+  }
+  answer.limits.push_back(
+      fmt::format("just noticeable differences: {} of a force, {} of a stiffness that is touched, "
+                  "{} of one felt through a tool",
+                  percent(kForceJnd), percent(kStiffnessTouched), percent(kStiffnessThroughTool)));
+  answer.warnings = remark_texts(b.remarks);
+  return answer;
+}
+
+std::string to_csv(const ErrorBudget& b) {
+  NumberColumns columns{{"time_s", b.time_s}};
+  for (const BudgetStage& s : b.stages) columns.emplace_back(s.name + "_N", s.force_N);
+  for (const BudgetLine& line : b.lines) {
+    columns.emplace_back(fmt::format("line_{}_N", line.name), line.difference_N);
+  }
+  constexpr int kDigits = 12;
+  return numbers_csv(columns, kDigits);
 }
 
 }  // namespace tpm::fit

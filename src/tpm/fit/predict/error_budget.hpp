@@ -8,6 +8,7 @@
 #include "tpm/files/json.hpp"
 #include "tpm/fit/select/recording_setup.hpp"
 #include "tpm/organ/scene/experiment_scene.hpp"
+#include "tpm/show/short_answer.hpp"
 #include "tpmkit/law_file.hpp"
 #include "tpmkit/protocol.hpp"
 
@@ -132,6 +133,7 @@ void conclude(ErrorBudget& budget);
 
 [[nodiscard]] Json to_json(const ErrorBudget& budget);
 [[nodiscard]] std::string to_terminal_text(const ErrorBudget& budget);
+[[nodiscard]] ShortAnswer short_answer(const ErrorBudget& budget);
 /// time_s, each stage's force and each line's difference, SI.
 [[nodiscard]] std::string to_csv(const ErrorBudget& budget);
 

@@ -8,8 +8,8 @@
 #include "tpm/base/sized_unit.hpp"
 #include "tpm/base/text.hpp"
 #include "tpm/files/blocks/law_json.hpp"
-#include "tpm/files/delimited.hpp"
 #include "tpm/fit/predict/law_prediction.hpp"
+#include "tpm/show/table_document.hpp"
 
 namespace tpm::fit {
 namespace {
@@ -112,30 +112,24 @@ Json to_json(const LawPrediction& p) {
 
 std::string to_csv(const LawPrediction& p) {
   const std::string suffix = unit_suffix(p.response_dimension());
-  std::string text = fmt::format("time_s,{},mean{},standard_error{},mean_lower{},mean_upper{}",
-                                 drive_key(p), suffix, suffix, suffix, suffix);
+  NumberColumns columns{{"time_s", p.time_s},
+                        {drive_key(p), p.imposed},
+                        {"mean" + suffix, p.response},
+                        {"standard_error" + suffix, p.standard_error},
+                        {"mean_lower" + suffix, p.mean_lower},
+                        {"mean_upper" + suffix, p.mean_upper}};
   if (!p.reading_lower.empty()) {
-    text += fmt::format(",reading_lower{},reading_upper{}", suffix, suffix);
+    columns.emplace_back("reading_lower" + suffix, p.reading_lower);
+    columns.emplace_back("reading_upper" + suffix, p.reading_upper);
   }
-  if (p.recording) text += fmt::format(",observed{},was_fitted", suffix);
-  text += "\n";
-  const auto cell = [](double value) {
-    return std::isfinite(value) ? significant(value, 9) : std::string();
-  };
-  for (std::size_t i = 0; i < p.time_s.size(); ++i) {
-    text +=
-        fmt::format("{},{},{},{},{},{}", cell(p.time_s[i]), cell(p.imposed[i]), cell(p.response[i]),
-                    cell(p.standard_error[i]), cell(p.mean_lower[i]), cell(p.mean_upper[i]));
-    if (!p.reading_lower.empty()) {
-      text += fmt::format(",{},{}", cell(p.reading_lower[i]), cell(p.reading_upper[i]));
-    }
-    if (p.recording) {
-      text +=
-          fmt::format(",{},{}", cell(p.recording->observed[i]), p.recording->was_fitted[i] ? 1 : 0);
-    }
-    text += "\n";
+  std::vector<double> was_fitted;
+  if (p.recording) {
+    was_fitted.assign(p.recording->was_fitted.begin(), p.recording->was_fitted.end());
+    columns.emplace_back("observed" + suffix, p.recording->observed);
+    columns.emplace_back("was_fitted", was_fitted);
   }
-  return text;
+  constexpr int kDigits = 9;
+  return numbers_csv(columns, kDigits);
 }
 
 std::string to_terminal_text(const LawPrediction& p) {

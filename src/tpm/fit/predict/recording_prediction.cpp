@@ -7,7 +7,6 @@
 #include <cmath>
 
 #include "tpm/base/sized_unit.hpp"
-#include "tpm/base/text.hpp"
 #include "tpm/fit/fit.hpp"
 #include "tpm/fit/likelihood/delayed_rise.hpp"
 #include "tpm/fit/likelihood/load_imposed.hpp"

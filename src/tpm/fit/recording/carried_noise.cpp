@@ -1,6 +1,5 @@
 #include "tpm/fit/recording/carried_noise.hpp"
 
-#include <algorithm>
 #include <cmath>
 #include <span>
 #include <vector>

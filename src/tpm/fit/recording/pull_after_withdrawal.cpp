@@ -4,7 +4,6 @@
 #include <cmath>
 #include <numeric>
 
-#include "tpm/base/median.hpp"
 #include "tpm/fit/autoregressive.hpp"
 #include "tpm/fit/recording/prepared_recording.hpp"
 

@@ -9,7 +9,6 @@
 #include <optional>
 
 #include "tpm/base/sized_unit.hpp"
-#include "tpm/base/text.hpp"
 #include "tpm/fit/adequacy.hpp"
 #include "tpm/fit/likelihood/load_imposed.hpp"
 #include "tpm/fit/select/fit_adequacy.hpp"

@@ -8,7 +8,6 @@
 #include "tpm/fit/select/file_remarks.hpp"
 #include "tpm/fit/select/imposed_channel.hpp"
 #include "tpm/fit/select/material_function.hpp"
-#include "tpm/fit/select/recording_setup.hpp"
 #include "tpm/fit/select/selection.hpp"
 
 namespace tpm::fit {

@@ -8,7 +8,6 @@
 
 #include "tpm/base/distributions.hpp"
 #include "tpm/base/sized_unit.hpp"
-#include "tpm/base/text.hpp"
 #include "tpm/fit/select/placement_parameters.hpp"
 #include "tpm/fit/select/selection.hpp"
 #include "tpm/fit/verdict.hpp"

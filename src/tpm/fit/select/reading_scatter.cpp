@@ -9,7 +9,6 @@
 #include <vector>
 
 #include "tpm/base/distributions.hpp"
-#include "tpm/base/text.hpp"
 #include "tpm/fit/adequacy.hpp"
 
 namespace tpm::fit {

@@ -1,5 +1,4 @@
 // Declared in tpm/fit/fit.hpp.
-#include <fmt/format.h>
 
 #include <algorithm>
 #include <cmath>

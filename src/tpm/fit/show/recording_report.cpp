@@ -11,7 +11,6 @@
 #include "tpm/fit/show/fit_csv.hpp"
 #include "tpm/fit/show/view_fit.hpp"
 #include "tpm/show/draw.hpp"
-#include "tpmkit/law_file.hpp"
 
 namespace tpm::fit {
 namespace {

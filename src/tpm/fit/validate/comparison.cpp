@@ -9,7 +9,6 @@
 #include <numbers>
 
 #include "tpm/base/dense_algebra.hpp"
-#include "tpm/base/distributions.hpp"
 #include "tpm/base/lists.hpp"
 #include "tpm/base/text.hpp"
 #include "tpm/fit/autoregressive.hpp"

@@ -3,12 +3,10 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <cmath>
 #include <utility>
 
 #include "tpm/data/straight_pieces.hpp"
 #include "tpm/fit/likelihood/delayed_rise.hpp"
-#include "tpm/fit/validate/functional.hpp"
 #include "tpm/work/give_up.hpp"
 #include "tpmkit/error.hpp"
 #include "tpmkit/law_model.hpp"

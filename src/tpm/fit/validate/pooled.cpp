@@ -6,7 +6,6 @@
 #include <cmath>
 #include <limits>
 
-#include "tpm/base/text.hpp"
 #include "tpm/fit/groups/random_effects.hpp"
 #include "tpmkit/error.hpp"
 

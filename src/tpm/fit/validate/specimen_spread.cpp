@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
 
 #include "tpm/base/distributions.hpp"
 #include "tpm/fit/groups/random_effects.hpp"

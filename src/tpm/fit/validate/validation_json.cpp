@@ -1,5 +1,4 @@
 // Declared in tpm/fit/validate/validation.hpp.
-#include <fmt/format.h>
 
 #include <cmath>
 
