@@ -70,8 +70,7 @@ inline InverseHazardRow ended(const char* hazard, const char* expected, double b
   do {
     ++row.tries;
     StandInInverse service(PlantSettings{}, {}, true, faults);
-    InverseDevice device({service.port(), service.events_port(), service.port(), ""},
-                         limits_of("inverse3"));
+    InverseDevice device(service.address(), limits_of("inverse3"));
     (void)device.open();
     DevicePreparation preparation;
     preparation.real_time = true;

@@ -16,6 +16,7 @@
 
 #include "tpm/files/json.hpp"
 #include "tpm/haptics/device/virtual_plant.hpp"
+#include "tpm/haptics/inverse/inverse_device.hpp"
 #include "tpm/haptics/inverse/loopback.hpp"
 #include "tpm/haptics/inverse/messages.hpp"
 #include "tpm/haptics/loop/real_time.hpp"
@@ -81,6 +82,9 @@ class StandInInverse {
 
   [[nodiscard]] int port() const { return port_of(service_); }
   [[nodiscard]] int events_port() const { return port_of(events_); }
+  [[nodiscard]] InverseAddress address(std::string id = {}) const {
+    return {port(), events_port(), port(), std::move(id)};
+  }
   /// The script of the hand begins.
   void begin();
   void tell(const InverseEvent& event);
