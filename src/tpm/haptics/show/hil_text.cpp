@@ -5,7 +5,6 @@
 #include <cmath>
 #include <map>
 #include <optional>
-#include <sstream>
 #include <string_view>
 
 #include "tpm/base/lists.hpp"
@@ -231,16 +230,6 @@ std::string gate_text(const JitterCheck& check) {
                        : "session: none was named, so none was asked for its tissue\n";
 }
 
-/// Without empty lines.
-std::vector<std::string> each_line(const std::string& text) {
-  std::vector<std::string> lines;
-  std::istringstream in(text);
-  for (std::string line; std::getline(in, line);) {
-    if (!line.empty()) lines.push_back(line);
-  }
-  return lines;
-}
-
 }  // namespace
 
 Json check_json(const JitterCheck& check) {
@@ -292,9 +281,9 @@ std::string check_text(const JitterCheck& check) {
 
 ShortAnswer short_answer(const JitterCheck& check) {
   ShortAnswer answer;
-  answer.conclusion = each_line("timing: " + check.timing + "\n" + gate_text(check));
-  answer.limits = each_line(measured_text(check) + limits_text(check) + check.advice);
-  answer.warnings = each_line(said_by_device(check.outcome, check.findings));
+  answer.conclusion = separate_lines("timing: " + check.timing + "\n" + gate_text(check));
+  answer.limits = separate_lines(measured_text(check) + limits_text(check) + check.advice);
+  answer.warnings = separate_lines(said_by_device(check.outcome, check.findings));
   return answer;
 }
 

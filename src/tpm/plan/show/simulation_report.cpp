@@ -373,16 +373,6 @@ std::string resumed_text(const SimulationRun& run) {
   return fmt::format("resumed at {} s from a checkpoint\n", significant(*run.resumed_at_s, 4));
 }
 
-std::vector<std::string> separate_lines(std::string_view text) {
-  std::vector<std::string> lines;
-  while (!text.empty()) {
-    const std::string_view line = text.substr(0, text.find('\n'));
-    text.remove_prefix(std::min(line.size() + 1, text.size()));
-    lines.emplace_back(line);
-  }
-  return lines;
-}
-
 }  // namespace
 
 Json simulation_json(const ExperimentScene& scene, const RunNetwork& network,
