@@ -157,8 +157,7 @@ TEST_CASE("The first position is one of now, not one that was waiting", "[untime
   f.answers = 1;
   for (const bool real_time : {false, true}) {
     StandInInverse silent(PlantSettings{}, {}, true, f);
-    InverseDevice opened({silent.port(), silent.events_port(), silent.port(), ""},
-                         limits_of("inverse3"));
+    InverseDevice opened(silent.address(), limits_of("inverse3"));
     (void)opened.open();
     std::this_thread::sleep_for(50ms);
     DevicePreparation preparation = in_real_time(0.016);
