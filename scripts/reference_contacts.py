@@ -25,9 +25,10 @@ import h5py
 import numpy as np
 import scipy.sparse as sparse
 import scipy.sparse.linalg as linalg
+from reference_quasistatic import Bonds
 
 
-class Network:
+class Network(Bonds):
     """Bonds N = (k - g) l + g (l - sum of gamma_j m_j), dm_j/dt = (l - m_j) / tau_j."""
 
     def __init__(self, path):
@@ -81,33 +82,6 @@ class Network:
                 entries += vector.tolist()
                 count += 1
         return sparse.csc_matrix((entries, (rows, columns)), (3 * len(self.rest), count))
-
-    def elongation(self, x):
-        span = x[self.ends[:, 1]] - x[self.ends[:, 0]]
-        length = np.linalg.norm(span, axis=1)
-        return length - self.length, span / length[:, None], length
-
-    def forces(self, pull, unit):
-        force = np.zeros_like(self.rest)
-        np.add.at(force, self.ends[:, 0], pull[:, None] * unit)
-        np.add.at(force, self.ends[:, 1], -pull[:, None] * unit)
-        return force
-
-    def stiffness(self, slope, pull, unit, length, basis):
-        across = (pull / length)[:, None, None]
-        block = (slope[:, None, None] - across) * unit[:, :, None] * unit[:, None, :]
-        block += across * np.eye(3)
-        a, b = 3 * self.ends[:, 0], 3 * self.ends[:, 1]
-        three = np.arange(3)
-        entries, rows, columns = [], [], []
-        for i, j, sign in ((a, a, 1), (b, b, 1), (a, b, -1), (b, a, -1)):
-            rows.append(np.broadcast_to(i[:, None, None] + three[:, None], block.shape).ravel())
-            columns.append(np.broadcast_to(j[:, None, None] + three, block.shape).ravel())
-            entries.append(sign * block.ravel())
-        size = 3 * len(self.rest)
-        where = (np.concatenate(rows), np.concatenate(columns))
-        matrix = sparse.csc_matrix((np.concatenate(entries), where), (size, size))
-        return (basis.T @ matrix @ basis).tocsc()
 
     def balance(self, x, offset, following, load, basis):
         """x with the forces balanced where the mean memory is offset + following l."""

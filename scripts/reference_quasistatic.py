@@ -25,7 +25,39 @@ import scipy.sparse.linalg as linalg
 STIFFNESS_M = 12.56e-6 / 1e-3  # A0 / l0
 
 
-class Tissue:
+class Bonds:
+    """Of a network with positions at `rest`, `ends` of bonds and their `length` at rest."""
+
+    def elongation(self, x):
+        span = x[self.ends[:, 1]] - x[self.ends[:, 0]]
+        length = np.linalg.norm(span, axis=1)
+        return length - self.length, span / length[:, None], length
+
+    def forces(self, pull, unit):
+        force = np.zeros_like(self.rest)
+        np.add.at(force, self.ends[:, 0], pull[:, None] * unit)
+        np.add.at(force, self.ends[:, 1], -pull[:, None] * unit)
+        return force
+
+    def stiffness(self, slope, pull, unit, length, basis):
+        """The matrix of the coordinates that may move: the columns of a basis."""
+        across = (pull / length)[:, None, None]
+        block = (slope[:, None, None] - across) * unit[:, :, None] * unit[:, None, :]
+        block += across * np.eye(3)
+        a, b = 3 * self.ends[:, 0], 3 * self.ends[:, 1]
+        three = np.arange(3)
+        entries, rows, columns = [], [], []
+        for i, j, sign in ((a, a, 1), (b, b, 1), (a, b, -1), (b, a, -1)):
+            rows.append(np.broadcast_to(i[:, None, None] + three[:, None], block.shape).ravel())
+            columns.append(np.broadcast_to(j[:, None, None] + three, block.shape).ravel())
+            entries.append(sign * block.ravel())
+        size = 3 * len(self.rest)
+        where = (np.concatenate(rows), np.concatenate(columns))
+        matrix = sparse.csc_matrix((np.concatenate(entries), where), (size, size))
+        return (basis.T @ matrix @ basis).tocsc()
+
+
+class Tissue(Bonds):
     """Bonds N = k l - g y along themselves, and the coordinates that may move."""
 
     def __init__(self, path, modulus_Pa):
@@ -52,46 +84,17 @@ class Tissue:
         sideways[rows] = across.T
         self.basis = sparse.csc_matrix(np.hstack([columns[:, keep], sideways]))
 
-    def elongation(self, x):
-        span = x[self.ends[:, 1]] - x[self.ends[:, 0]]
-        length = np.linalg.norm(span, axis=1)
-        return length - self.length, span / length[:, None], length
-
-    def forces(self, x, pull, unit):
-        force = np.zeros_like(x)
-        np.add.at(force, self.ends[:, 0], pull[:, None] * unit)
-        np.add.at(force, self.ends[:, 1], -pull[:, None] * unit)
-        return force
-
-    def stiffness(self, slope, pull, unit, length):
-        """The matrix of the coordinates that may move."""
-        across = (pull / length)[:, None, None]
-        block = (slope[:, None, None] - across) * unit[:, :, None] * unit[:, None, :]
-        block += across * np.eye(3)
-        a, b = 3 * self.ends[:, 0], 3 * self.ends[:, 1]
-        three = np.arange(3)
-        entries, rows, columns = [], [], []
-        for i, j, sign in ((a, a, 1), (b, b, 1), (a, b, -1), (b, a, -1)):
-            shape = block.shape
-            rows.append(np.broadcast_to(i[:, None, None] + three[:, None], shape).ravel())
-            columns.append(np.broadcast_to(j[:, None, None] + three, shape).ravel())
-            entries.append(sign * block.ravel())
-        size = 3 * len(self.rest)
-        where = (np.concatenate(rows), np.concatenate(columns))
-        matrix = sparse.csc_matrix((np.concatenate(entries), where), (size, size))
-        return (self.basis.T @ matrix @ self.basis).tocsc()
-
     def balance(self, x, offset, following):
         """x with the forces balanced where y = offset + following l, and the contact force."""
         slope = self.k - self.g * following
         for _ in range(30):
             l, unit, length = self.elongation(x)
             pull = slope * l - self.g * offset
-            force = self.forces(x, pull, unit)
+            force = self.forces(pull, unit)
             left = self.basis.T @ force.ravel()
             if np.linalg.norm(left) < 1e-13:
                 return x, -np.sum(force * self.push)
-            change = linalg.splu(self.stiffness(slope, pull, unit, length)).solve(left)
+            change = linalg.splu(self.stiffness(slope, pull, unit, length, self.basis)).solve(left)
             x = x + (self.basis @ change).reshape(-1, 3)
             if np.linalg.norm(change) < 1e-15:
                 return x, -np.sum(force * self.push)

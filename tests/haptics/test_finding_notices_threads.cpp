@@ -8,6 +8,7 @@
 
 #include "inverse_clients.hpp"
 #include "inverse_sessions.hpp"
+#include "shaken_contact.hpp"
 #include "tpm/haptics/serve/inverse_server.hpp"
 #include "tpm/haptics/session/finding_notices.hpp"
 #include "tpm/haptics/session/identify_run.hpp"
@@ -20,23 +21,11 @@ namespace {
 using namespace test::inverse_sessions;
 
 /// Has findings that the test sets.
-class FindingHandle final : public HapticDevice {
+class FindingHandle final : public test::Puppet {
  public:
-  const DeviceIdentity& open() override { return identity_; }
-  void prepare(const DevicePreparation& /*preparation*/) override {}
-  DeviceAnswer read(Eigen::Vector3d& /*position_m*/) noexcept override { return DeviceAnswer::ok; }
-  DeviceAnswer write(const Eigen::Vector3d& /*force_N*/) noexcept override {
-    return DeviceAnswer::ok;
-  }
-  DeviceStatus status() noexcept override { return {}; }
   std::vector<DeviceFinding> findings() const override { return found; }
-  void stop() noexcept override {}
-  void cut_forces() noexcept override {}
 
   std::vector<DeviceFinding> found;
-
- private:
-  DeviceIdentity identity_;
 };
 
 TEST_CASE("Findings are told apart by their code, whatever their words begin with") {

@@ -12,6 +12,7 @@
 #include <functional>
 #include <memory>
 
+#include "shaken_contact.hpp"
 #include "temp_folder.hpp"
 #include "tpm/base/namespaces.hpp"
 #include "tpm/files/file.hpp"
@@ -174,19 +175,10 @@ TEST_CASE("When no device is guarded any more, signals do what they did before")
   struct sigaction before {};
   sigaction(SIGSEGV, nullptr, &before);
   {
-    class Quiet final : public HapticDevice {
+    class Quiet final : public test::Puppet {
      public:
-      const DeviceIdentity& open() override { return identity_; }
-      void prepare(const DevicePreparation&) override {}
-      DeviceAnswer read(Eigen::Vector3d&) noexcept override { return DeviceAnswer::ok; }
-      DeviceAnswer write(const Eigen::Vector3d&) noexcept override { return DeviceAnswer::ok; }
-      DeviceStatus status() noexcept override { return {}; }
-      void stop() noexcept override {}
       void cut_forces() noexcept override { ++cut; }
       int cut = 0;
-
-     private:
-      DeviceIdentity identity_;
     } quiet;
     const ForcesOffGuard guard(quiet);
     {

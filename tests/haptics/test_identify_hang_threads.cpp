@@ -20,13 +20,12 @@ struct HangSeen {
 };
 
 /// A free handle one of whose reads hangs until forces are cut, or for 0.4 s.
-class HangingHandle final : public HapticDevice {
+class HangingHandle final : public VirtualOmega7 {
  public:
   HangingHandle(const PlantSettings& plant, std::shared_ptr<HangSeen> seen)
-      : device_(plant, {}), seen_(std::move(seen)) {}
-  const DeviceIdentity& open() override { return device_.open(); }
-  void prepare(const DevicePreparation& preparation) override { device_.prepare(preparation); }
-  void enable_forces() override { device_.enable_forces(); }
+      : VirtualOmega7(plant, {}), seen_(std::move(seen)) {}
+  void await() noexcept override {}  // it has no script
+  void begin() noexcept override {}
   DeviceAnswer read(Eigen::Vector3d& position_m) noexcept override {
     constexpr int kHangsAt = 500;
     if (++seen_->reads == kHangsAt) {
@@ -34,21 +33,14 @@ class HangingHandle final : public HapticDevice {
       for (int i = 0; i < 400 && !seen_->cut_while_hanging; ++i) std::this_thread::sleep_for(1ms);
       seen_->hanging = false;
     }
-    return device_.read(position_m);
+    return VirtualOmega7::read(position_m);
   }
-  DeviceAnswer write(const Eigen::Vector3d& force_N) noexcept override {
-    return device_.write(force_N);
-  }
-  DeviceStatus status() noexcept override { return device_.status(); }
-  void advance(double seconds) noexcept override { device_.advance(seconds); }
-  void stop() noexcept override { device_.stop(); }
   void cut_forces() noexcept override {
     if (seen_->hanging) seen_->cut_while_hanging = true;
-    device_.cut_forces();
+    VirtualOmega7::cut_forces();
   }
 
  private:
-  VirtualOmega7 device_;
   std::shared_ptr<HangSeen> seen_;
 };
 

@@ -26,41 +26,30 @@ using Catch::Matchers::WithinAbs;
 using Catch::Matchers::WithinRel;
 
 /// The simulated device, which fails after so many positions in the way of a test.
-class FailingHandle final : public HapticDevice {
+class FailingHandle final : public VirtualOmega7 {
  public:
   FailingHandle(const HilSession& session, int after, ForcesOff how = ForcesOff::unplugged,
                 std::vector<DeviceFinding> findings = {})
-      : device_(session.plant, session.operator_script()),
+      : VirtualOmega7(session.plant, session.operator_script()),
         left_(after),
         how_(how),
         findings_(std::move(findings)) {}
   const DeviceIdentity& open() override {
-    if (left_ > 0) return device_.open();
+    if (left_ > 0) return VirtualOmega7::open();
     throw Error(ExitCode::environment, "inverse3", "the service is silent",
                 "a service that answers each message");
   }
-  void prepare(const DevicePreparation& preparation) override { device_.prepare(preparation); }
-  void enable_forces() override { device_.enable_forces(); }
   DeviceAnswer read(Eigen::Vector3d& position_m) noexcept override {
-    return --left_ > 0 ? device_.read(position_m) : DeviceAnswer::failed;
-  }
-  DeviceAnswer write(const Eigen::Vector3d& force_N) noexcept override {
-    return device_.write(force_N);
+    return --left_ > 0 ? VirtualOmega7::read(position_m) : DeviceAnswer::failed;
   }
   DeviceStatus status() noexcept override {
-    DeviceStatus status = device_.status();
+    DeviceStatus status = VirtualOmega7::status();
     if (left_ <= 0) status.forces_off = how_;
     return status;
   }
   std::vector<DeviceFinding> findings() const override { return findings_; }
-  void await() noexcept override { device_.await(); }
-  void begin() noexcept override { device_.begin(); }
-  void advance(double seconds) noexcept override { device_.advance(seconds); }
-  void stop() noexcept override { device_.stop(); }
-  void cut_forces() noexcept override { device_.cut_forces(); }
 
  private:
-  VirtualOmega7 device_;
   int left_;
   ForcesOff how_;
   std::vector<DeviceFinding> findings_;

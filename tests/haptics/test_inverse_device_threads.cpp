@@ -32,8 +32,7 @@ TEST_CASE("A service is opened in both formats, made neutral, and what it says i
     StandInFaults faults;
     faults.version = old ? "3.1.1.0" : "3.5.0.0";
     StandInInverse service(PlantSettings{}, {}, false, faults);
-    InverseDevice device({service.port(), service.events_port(), service.port(), ""},
-                         limits_of("inverse3"));
+    InverseDevice device(service.address(), limits_of("inverse3"));
     const DeviceIdentity& identity = device.open();
     CHECK(identity.kind == "inverse3");
     CHECK(identity.serial == "049D");
@@ -143,8 +142,7 @@ TEST_CASE("The first position is one of now, not one that was waiting", "[untime
   StandInFaults f;
   f.unasked_states = 3;
   StandInInverse service(PlantSettings{}, {}, false, f);
-  InverseDevice device({service.port(), service.events_port(), service.port(), ""},
-                       limits_of("inverse3"));
+  InverseDevice device(service.address(), limits_of("inverse3"));
   (void)device.open();
   device.prepare({});
   device.enable_forces();
@@ -159,8 +157,7 @@ TEST_CASE("The first position is one of now, not one that was waiting", "[untime
   f.answers = 1;
   for (const bool real_time : {false, true}) {
     StandInInverse silent(PlantSettings{}, {}, true, f);
-    InverseDevice opened({silent.port(), silent.events_port(), silent.port(), ""},
-                         limits_of("inverse3"));
+    InverseDevice opened(silent.address(), limits_of("inverse3"));
     (void)opened.open();
     std::this_thread::sleep_for(50ms);
     DevicePreparation preparation = in_real_time(0.016);
@@ -185,8 +182,7 @@ TEST_CASE("A state is as old as the message that it answers") {
     f.late_s = 0.006 - jitter_s;
     f.jitter_s = jitter_s;
     StandInInverse service(PlantSettings{}, {}, true, f);
-    InverseDevice device({service.port(), service.events_port(), service.port(), ""},
-                         limits_of("inverse3"));
+    InverseDevice device(service.address(), limits_of("inverse3"));
     (void)device.open();
     device.prepare(in_real_time(2.0));
     device.enable_forces();
@@ -211,8 +207,7 @@ TEST_CASE("A device that keeps the clock has no virtual time") {
   StandInFaults faults;
   faults.simulated = false;
   StandInInverse service(PlantSettings{}, {}, false, faults);
-  InverseDevice device({service.port(), service.events_port(), service.port(), ""},
-                       limits_of("inverse3"));
+  InverseDevice device(service.address(), limits_of("inverse3"));
   CHECK(device.open().hardware);
   CHECK_THAT(refusal_of([&] { device.prepare({}); }), Contains("expected --clock real"));
 }
@@ -317,9 +312,8 @@ SessionRun run_on(const StandInFaults& faults,
   brief["creep"].update({{"hold", "0.3 s"}, {"rest", "0.2 s"}});
   const HilSession session = test::parsed(brief);
   StandInInverse service(plant_of(session, 0), session.operator_script(), false, faults);
-  const auto device = std::make_shared<InverseDevice>(
-      InverseAddress{service.port(), service.events_port(), service.port(), "049D"},
-      limits_of("inverse3"));
+  const auto device =
+      std::make_shared<InverseDevice>(service.address("049D"), limits_of("inverse3"));
   DeviceLimits limits = limits_of("inverse3");
   limits.simulated = true;  // its delay is not what is tried here
   SessionRunOptions options;
@@ -384,8 +378,7 @@ TEST_CASE("A workspace that is scaled, turned or moved during a session ends it"
     faults.how = How::workspace;
     faults.transform = transform;
     StandInInverse service(PlantSettings{}, {}, true, faults);
-    InverseDevice device(InverseAddress{service.port(), service.events_port(), service.port(), ""},
-                         limits_of("inverse3"));
+    InverseDevice device(service.address(), limits_of("inverse3"));
     CHECK_THROWS_WITH(device.open(), Contains("the service scales coordinates") ||
                                          Contains("the service turns coordinates"));
   }
@@ -422,8 +415,7 @@ TEST_CASE("Events of the service end a session with their words", "[untimed]") {
 TEST_CASE(
     "A thread of messages without commands sends zero, and states that stop are no position") {
   StandInInverse service(PlantSettings{}, {}, true);
-  InverseDevice device({service.port(), service.events_port(), service.port(), ""},
-                       limits_of("inverse3"));
+  InverseDevice device(service.address(), limits_of("inverse3"));
   (void)device.open();
   DevicePreparation preparation;
   preparation.real_time = true;
@@ -448,8 +440,7 @@ TEST_CASE(
 
 TEST_CASE("Forces that are cut from another thread are zero at the service before that returns") {
   StandInInverse service(PlantSettings{}, {}, true);
-  InverseDevice device({service.port(), service.events_port(), service.port(), ""},
-                       limits_of("inverse3"));
+  InverseDevice device(service.address(), limits_of("inverse3"));
   (void)device.open();
   DevicePreparation preparation;
   preparation.real_time = true;
@@ -475,8 +466,7 @@ TEST_CASE("Answers that are dropped now and then end nothing") {
   faults.from = 1;
   faults.how = How::drop_every_third;
   StandInInverse service(PlantSettings{}, {}, true, faults);
-  InverseDevice device({service.port(), service.events_port(), service.port(), ""},
-                       limits_of("inverse3"));
+  InverseDevice device(service.address(), limits_of("inverse3"));
   (void)device.open();
   DevicePreparation preparation;
   preparation.real_time = true;

@@ -152,8 +152,7 @@ TEST_CASE("Forces that are compared are read by another thread as a whole") {
 /// 500 periods of 1 N on such a service.
 std::vector<DeviceFinding> findings_on(const StandInFaults& faults) {
   StandInInverse service(PlantSettings{}, {}, false, faults);
-  InverseDevice device({service.port(), service.events_port(), service.port(), ""},
-                       limits_of("inverse3"));
+  InverseDevice device(service.address(), limits_of("inverse3"));
   (void)device.open();
   device.prepare({});
   device.enable_forces();

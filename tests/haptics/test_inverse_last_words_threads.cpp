@@ -13,6 +13,7 @@
 
 #include "inverse_sessions.hpp"
 #include "made_check.hpp"
+#include "shaken_contact.hpp"
 #include "tpm/base/remark.hpp"
 #include "tpm/haptics/loop/empty_space.hpp"
 #include "tpm/haptics/loop/servo_step.hpp"
@@ -29,14 +30,10 @@ using test::StandInFaults;
 using test::StandInInverse;
 using How = StandInFaults::How;
 
-InverseAddress address_of_talker(const StandInInverse& service) {
-  return {service.port(), service.events_port(), service.port(), ""};
-}
-
 /// Status after the end of a device whose service fails at its fifth force.
 DeviceStatus status_after_end(const StandInFaults& faults, bool real_time) {
   StandInInverse service(PlantSettings{}, {}, real_time, faults);
-  InverseDevice device(address_of_talker(service), limits_of("inverse3"));
+  InverseDevice device(service.address(), limits_of("inverse3"));
   (void)device.open();
   DevicePreparation preparation;
   preparation.watchdog_s = 2.0;
@@ -87,7 +84,7 @@ TEST_CASE("Findings and a cut of the forces come from other threads while loop a
       f.last_event = "device-disconnected";
     }
     StandInInverse service(PlantSettings{}, {}, true, f);
-    InverseDevice device(address_of_talker(service), limits_of("inverse3"));
+    InverseDevice device(service.address(), limits_of("inverse3"));
     (void)device.open();
     std::atomic<bool> ended{false}, complete{true};
     std::thread looking([&] {
@@ -142,7 +139,7 @@ TEST_CASE("A service that falls silent while it is opened is quoted with its eve
   StandInFaults f;
   f.answers = 0;
   StandInInverse service(PlantSettings{}, {}, false, f);
-  InverseDevice device(address_of_talker(service), limits_of("inverse3"));
+  InverseDevice device(service.address(), limits_of("inverse3"));
   std::atomic<bool> opened{false};
   std::thread talking([&] {
     while (!opened) {
@@ -157,32 +154,24 @@ TEST_CASE("A service that falls silent while it is opened is quoted with its eve
 }
 
 /// Fails, or has nothing but old positions; only at the end does it know that it is unplugged.
-class LastWordsHandle final : public HapticDevice {
+class LastWordsHandle final : public test::Puppet {
  public:
   LastWordsHandle(DeviceAnswer answer, bool learns) : answer_(answer), learns_(learns) {}
-  const DeviceIdentity& open() override { return identity_; }
-  void prepare(const DevicePreparation& /*preparation*/) override {}
   DeviceAnswer read(Eigen::Vector3d& /*position_m*/) noexcept override { return answer_; }
-  DeviceAnswer write(const Eigen::Vector3d& /*force_N*/) noexcept override {
-    return DeviceAnswer::ok;
-  }
   DeviceStatus status() noexcept override {
     DeviceStatus status;
     status.failed = answer_ == DeviceAnswer::failed && !learned_;
     if (learned_) status.forces_off = ForcesOff::unplugged;
     return status;
   }
-  void stop() noexcept override {}
   bool learn_end() noexcept override {
     learned_ = learns_;
     return learns_;
   }
-  void cut_forces() noexcept override {}
 
  private:
   DeviceAnswer answer_;
   bool learns_, learned_ = false;
-  DeviceIdentity identity_;
 };
 
 ServoOutcome outcome_of_last_words(DeviceAnswer answer, bool learns) {
@@ -237,7 +226,7 @@ TEST_CASE("Torque scaling and a mount that is moved are set neutral or refused")
       f.mounted_m = 0.02;
     }
     StandInInverse service(PlantSettings{}, {}, false, f);
-    InverseDevice device(address_of_talker(service), limits_of("inverse3"));
+    InverseDevice device(service.address(), limits_of("inverse3"));
     CHECK_THAT(fmt::format("{}", fmt::join(base::remark_texts(device.open().assumptions), "\n")),
                Contains("mount at 0 0 0 m") && Contains("torque scaling off"));
     CHECK(service.settings().torque_scaling == false);
@@ -256,7 +245,7 @@ TEST_CASE("What a service does not say of gravity, and a mount of a preset, are 
   f.names_no_gravity = true;
   f.mounted_m = 0.02;
   StandInInverse service(PlantSettings{}, {}, false, f);
-  InverseDevice device(address_of_talker(service), limits_of("inverse3"));
+  InverseDevice device(service.address(), limits_of("inverse3"));
   (void)device.open();
   const std::vector<DeviceFinding> found = device.findings();
   REQUIRE(found.size() == 2);
@@ -271,7 +260,7 @@ TEST_CASE("An inventory that cannot be read and no events are of the environment
   f.no_inventory_json = true;
   StandInInverse service(PlantSettings{}, {}, false, f);
   try {
-    (void)inverse_inventory(address_of_talker(service));
+    (void)inverse_inventory(service.address());
     FAIL("it was read");
   } catch (const Error& error) {
     CHECK(error.code() == ExitCode::environment);

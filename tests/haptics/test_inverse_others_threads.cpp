@@ -38,7 +38,7 @@ TEST_CASE("A device is chosen by its id or place; a wrong one is refused with th
                                           "0A14; expected --serial with one of these"));
   const auto at = [&f](int index) {
     StandInInverse service(PlantSettings{}, {}, false, f);
-    InverseAddress address{service.port(), service.events_port(), service.port(), ""};
+    InverseAddress address = service.address();
     address.index = index;
     InverseDevice device(address, limits_of("inverse3"));
     return refusal_of([&] { (void)device.open(); });
@@ -59,8 +59,7 @@ TEST_CASE("A simulated device that another client drives is refused, hardware is
                                   "a device that nobody drives: end that client"));
   f.simulated = false;
   StandInInverse service(PlantSettings{}, {}, false, f);
-  const InverseAddress address{service.port(), service.events_port(), service.port(), ""};
-  InverseDevice device(address, limits_of("inverse3"));
+  InverseDevice device(service.address(), limits_of("inverse3"));
   CHECK(device.open().hardware);
   REQUIRE(device.findings().size() == 1);
   CHECK(device.findings().front().code == "in_use");
@@ -158,8 +157,7 @@ TEST_CASE("A connection that ends is no unplugged device, and says how it ended"
     f.close_code = c.code;
     f.close_reason = c.reason;
     StandInInverse service(PlantSettings{}, {}, false, f);
-    InverseDevice device({service.port(), service.events_port(), service.port(), ""},
-                         limits_of("inverse3"));
+    InverseDevice device(service.address(), limits_of("inverse3"));
     (void)device.open();
     device.prepare({});
     device.enable_forces();

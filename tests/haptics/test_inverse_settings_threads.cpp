@@ -26,19 +26,18 @@ TEST_CASE("What no message sets is set over HTTP, read back and recorded") {
     StandInFaults f;
     f.version = version;
     StandInInverse service(PlantSettings{}, {}, false, f);
-    const InverseAddress address{service.port(), service.events_port(), service.port(), ""};
-    InverseDevice device(address, limits_of("inverse3"));
+    InverseDevice device(service.address(), limits_of("inverse3"));
     const std::vector<std::string> lines = base::remark_texts(device.open().assumptions);
     CHECK(service.settings().carried() == 1.0);
     CHECK_THAT(fmt::format("{}", fmt::join(lines, "\n")),
                Contains("gravity compensation on, factor 1"));
     CHECK(service.posts().size() == 1);
-    InverseAddress half = address;
+    InverseAddress half = service.address();
     half.gravity_carried = 0.5;
     InverseDevice again(half, limits_of("inverse3"));
     CHECK_THAT(fmt::format("{}", fmt::join(base::remark_texts(again.open().assumptions), "\n")),
                Contains("gravity compensation on, factor 0.5"));
-    InverseAddress none = address;
+    InverseAddress none = service.address();
     none.gravity_carried = 0.0;
     InverseDevice last(none, limits_of("inverse3"));
     (void)last.open();

@@ -24,34 +24,17 @@ namespace {
 using Catch::Matchers::Contains;
 
 /// The simulated device, with buttons that are pressed when a test says.
-class Pressed final : public HapticDevice {
+class Pressed final : public VirtualOmega7 {
  public:
-  explicit Pressed(const HilSession& session) : device_(session.plant, session.operator_script()) {}
-  const DeviceIdentity& open() override { return device_.open(); }
-  void prepare(const DevicePreparation& preparation) override { device_.prepare(preparation); }
-  void enable_forces() override { device_.enable_forces(); }
-  DeviceAnswer read(Eigen::Vector3d& position_m) noexcept override {
-    return device_.read(position_m);
-  }
-  DeviceAnswer write(const Eigen::Vector3d& force_N) noexcept override {
-    return device_.write(force_N);
-  }
-  DeviceStatus status() noexcept override { return device_.status(); }
+  explicit Pressed(const HilSession& session)
+      : VirtualOmega7(session.plant, session.operator_script()) {}
   HandState hand() noexcept override {
     HandState state;
     state.buttons = buttons;
     return state;
   }
-  void await() noexcept override { device_.await(); }
-  void begin() noexcept override { device_.begin(); }
-  void advance(double seconds) noexcept override { device_.advance(seconds); }
-  void stop() noexcept override { device_.stop(); }
-  void cut_forces() noexcept override { device_.cut_forces(); }
 
   std::uint32_t buttons = 0;
-
- private:
-  VirtualOmega7 device_;
 };
 
 /// Cycles with the flag of a marker.

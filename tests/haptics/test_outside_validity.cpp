@@ -3,6 +3,7 @@
 #include <cmath>
 
 #include "counted_allocations.hpp"
+#include "late_hand.hpp"
 #include "shaken_contact.hpp"
 #include "tpm/haptics/loop/servo_step.hpp"
 
@@ -13,10 +14,10 @@ using test::guarded;
 using test::Puppet;
 
 /// A spring of which every second answer, or none after a while, is valid.
-class OftenInvalid final : public ContactModel {
+class OftenInvalid final : public test::LinearSpring {
  public:
   enum class Way { alternating, for_good };
-  explicit OftenInvalid(Way way) : way_(way) {}
+  explicit OftenInvalid(Way way) : LinearSpring(200.0, 1e-3), way_(way) {}
   void reset() noexcept override { steps_ = 0; }
   ContactAnswer step(const ToolPose& tool) noexcept override {
     ++steps_;
@@ -24,13 +25,6 @@ class OftenInvalid final : public ContactModel {
     answer.valid = way_ == Way::alternating ? steps_ < 500 || steps_ % 2 == 0 : steps_ < 500;
     answer.force_N = (answer.valid ? -200.0 : -600.0) * tool.displacement_m;
     return answer;
-  }
-  [[nodiscard]] double period_s() const noexcept override { return 1e-3; }
-  [[nodiscard]] Eigen::Matrix3d instantaneous_stiffness() const noexcept override {
-    return 200.0 * Eigen::Matrix3d::Identity();
-  }
-  [[nodiscard]] Eigen::Matrix3d equilibrium_stiffness() const noexcept override {
-    return instantaneous_stiffness();
   }
 
  private:

@@ -5,6 +5,7 @@
 
 #include "counted_allocations.hpp"
 #include "hil_scenes.hpp"
+#include "late_hand.hpp"
 #include "shaken_contact.hpp"
 #include "temp_folder.hpp"
 #include "tpm/base/random.hpp"
@@ -123,18 +124,11 @@ TEST_CASE("The surface lets go at zero force, recovers, and is met again where i
 }
 
 /// 100 N/m that never pull, as a law without relaxing branches.
-class ElasticSurface final : public ContactModel {
+class ElasticSurface final : public test::LinearSpring {
  public:
-  void reset() noexcept override {}
+  ElasticSurface() : LinearSpring(100.0, 1e-3) {}
   ContactAnswer step(const ToolPose& tool) noexcept override {
     return {Eigen::Vector3d(0.0, 0.0, -100.0 * std::max(tool.displacement_m.z(), 0.0))};
-  }
-  [[nodiscard]] double period_s() const noexcept override { return 1e-3; }
-  [[nodiscard]] Eigen::Matrix3d instantaneous_stiffness() const noexcept override {
-    return 100.0 * Eigen::Matrix3d::Identity();
-  }
-  [[nodiscard]] Eigen::Matrix3d equilibrium_stiffness() const noexcept override {
-    return instantaneous_stiffness();
   }
 };
 

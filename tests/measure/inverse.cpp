@@ -62,9 +62,7 @@ void round_trips(bool poll, double seconds) {
 DeviceChoice choice_of(const test::StandInInverse& service, bool poll) {
   DeviceChoice choice;
   choice.kind = "inverse3";
-  choice.inverse.port = service.port();
-  choice.inverse.events_port = service.events_port();
-  choice.inverse.old_http_port = service.port();
+  choice.inverse = service.address();
   choice.inverse.poll = poll;
   return choice;
 }

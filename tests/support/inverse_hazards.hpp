@@ -48,7 +48,7 @@ inline InverseHazardRow refused(const char* hazard, const char* expected,
                                 const StandInFaults& faults, bool dead = false) {
   InverseHazardRow row{hazard, expected, "opened", 0.0, 5.0, 0.0, 0.0, 1};
   auto service = std::make_unique<StandInInverse>(PlantSettings{}, OperatorScript{}, true, faults);
-  const InverseAddress address{service->port(), service->events_port(), service->port(), ""};
+  const InverseAddress address = service->address();
   if (dead) service.reset();
   const std::int64_t began_ns = now_ns();
   InverseDevice device(address, limits_of("inverse3"));
@@ -70,8 +70,7 @@ inline InverseHazardRow ended(const char* hazard, const char* expected, double b
   do {
     ++row.tries;
     StandInInverse service(PlantSettings{}, {}, true, faults);
-    InverseDevice device({service.port(), service.events_port(), service.port(), ""},
-                         limits_of("inverse3"));
+    InverseDevice device(service.address(), limits_of("inverse3"));
     (void)device.open();
     DevicePreparation preparation;
     preparation.real_time = true;

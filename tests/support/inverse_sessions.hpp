@@ -35,17 +35,14 @@ inline PlantSettings plant_of(const HilSession& session, int late_ms) {
 inline DeviceChoice choice_of(const StandInInverse& service) {
   DeviceChoice choice;
   choice.kind = "inverse3";
-  choice.inverse.port = service.port();
-  choice.inverse.events_port = service.events_port();
-  choice.inverse.old_http_port = service.port();
+  choice.inverse = service.address();
   return choice;
 }
 
 /// Message with which a device on such a service cannot be opened.
 inline std::string refusal(const StandInFaults& faults, const std::string& id = {}) {
   StandInInverse service(PlantSettings{}, {}, false, faults);
-  InverseAddress address{service.port(), service.events_port(), service.port(), id};
-  InverseDevice device(address, limits_of("inverse3"));
+  InverseDevice device(service.address(id), limits_of("inverse3"));
   return refusal_of([&] { (void)device.open(); });
 }
 

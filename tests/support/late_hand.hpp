@@ -15,7 +15,7 @@ namespace tpm::test {
 using namespace haptics;
 
 /// A spring of stiffness K in every direction.
-class LinearSpring final : public ContactModel {
+class LinearSpring : public ContactModel {
  public:
   LinearSpring(double stiffness_N_per_m, double period_s)
       : stiffness_N_per_m_(stiffness_N_per_m), period_s_(period_s) {}

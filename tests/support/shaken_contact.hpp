@@ -10,7 +10,7 @@ namespace tpm::test {
 using namespace haptics;
 
 /// A device that is wherever a test puts it.
-class Puppet final : public HapticDevice {
+class Puppet : public HapticDevice {
  public:
   const DeviceIdentity& open() override { return identity_; }
   void prepare(const DevicePreparation&) override {}

@@ -9,15 +9,13 @@
 #include <deque>
 #include <memory>
 #include <mutex>
-#include <optional>
 #include <string>
 #include <thread>
 #include <vector>
 
 #include "tpm/files/json.hpp"
 #include "tpm/haptics/device/virtual_plant.hpp"
-#include "tpm/haptics/inverse/loopback.hpp"
-#include "tpm/haptics/inverse/messages.hpp"
+#include "tpm/haptics/inverse/inverse_device.hpp"
 #include "tpm/haptics/loop/real_time.hpp"
 
 namespace tpm::test {
@@ -80,7 +78,9 @@ class StandInInverse {
   StandInInverse& operator=(const StandInInverse&) = delete;
 
   [[nodiscard]] int port() const { return port_of(service_); }
-  [[nodiscard]] int events_port() const { return port_of(events_); }
+  [[nodiscard]] InverseAddress address(std::string id = {}) const {
+    return {port(), port_of(events_), port(), std::move(id)};
+  }
   /// The script of the hand begins.
   void begin();
   void tell(const InverseEvent& event);
@@ -441,7 +441,7 @@ inline void StandInInverse::talk(Socket socket, bool events) {
         stand_in::send_bytes(socket.handle(), http(*request, body));
         break;
       }
-      std::string upgrade = answer_upgrade(*request, events ? events_port() : port(), {}).bytes;
+      auto upgrade = answer_upgrade(*request, port_of(events ? events_ : service_), {}).bytes;
       if (!faults_.wrong_accept.empty()) {
         const std::size_t at = upgrade.find("Accept: ") + 8;
         upgrade.replace(at, upgrade.find("\r\n", at) - at, faults_.wrong_accept);

@@ -81,6 +81,16 @@ std::string to_text(const ShortAnswer& answer, std::size_t most) {
   return text;
 }
 
+std::vector<std::string> separate_lines(std::string_view text) {
+  std::vector<std::string> lines;
+  for (std::size_t from = 0; from < text.size();) {
+    const std::size_t end = std::min(text.find('\n', from), text.size());
+    if (end > from) lines.emplace_back(text.substr(from, end - from));
+    from = end + 1;
+  }
+  return lines;
+}
+
 std::vector<std::string> counted(std::vector<std::string> lines, std::size_t most,
                                  const char* what) {
   if (lines.size() <= most) return lines;

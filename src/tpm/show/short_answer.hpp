@@ -2,6 +2,7 @@
 #include <cstddef>
 #include <functional>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "tpm/base/namespaces.hpp"
@@ -27,6 +28,9 @@ struct ShortAnswer {
 
 /// At most `most` lines, each ended. A line feed within a part becomes a blank.
 [[nodiscard]] std::string to_text(const ShortAnswer& answer, std::size_t most = kAnswerLines);
+
+/// The lines of a text that are not empty.
+[[nodiscard]] std::vector<std::string> separate_lines(std::string_view text);
 
 /// At most `most` of the lines; the last one counts the others: "... and 3 more recordings".
 [[nodiscard]] std::vector<std::string> counted(std::vector<std::string> lines, std::size_t most,

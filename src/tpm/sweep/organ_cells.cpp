@@ -456,7 +456,7 @@ std::shared_ptr<const SweepModel> organ_sweep_model(const SweepKeys& keys, std::
   setup.protocol =
       parse_protocol_block(setup.scene.at("protocol"), at_protocol, Openness::complete);
   setup.material = scene.tissue.materials.materials.front();
-  setup.by_depth = scene.protocol.drive() == Drive::displacement;
+  setup.by_depth = scene.by_depth();
   require_outputs(setup, place.key("outputs"));
   return std::make_shared<OrganSweepModel>(std::move(setup));
 }

@@ -63,45 +63,34 @@ void hang(Moments& moments, double seconds) noexcept {
 }
 
 /// The simulated device, whose calls take time.
-class SlowDevice final : public HapticDevice {
+class SlowDevice final : public VirtualOmega7 {
  public:
   SlowDevice(const HilSession& session, const ClockHazard& hazard, std::shared_ptr<Moments> moments)
-      : device_(session.plant, session.operator_script()),
+      : VirtualOmega7(session.plant, session.operator_script()),
         hazard_(hazard),
         moments_(std::move(moments)) {}
 
-  const DeviceIdentity& open() override { return device_.open(); }
-  void prepare(const DevicePreparation& preparation) override { device_.prepare(preparation); }
-  void enable_forces() override { device_.enable_forces(); }
   DeviceAnswer read(Eigen::Vector3d& position_m) noexcept override {
     if (begun_) ++period_;
     const bool once = hazard_.kind == ClockFaultKind::read_hangs && period_ == hazard_.at;
     const bool ever = hazard_.kind == ClockFaultKind::slow_calls && period_ >= hazard_.at;
     if (once || ever) hang(*moments_, hazard_.lasts_s);
-    return device_.read(position_m);
+    return VirtualOmega7::read(position_m);
   }
-  DeviceAnswer write(const Eigen::Vector3d& force_N) noexcept override {
-    return device_.write(force_N);
-  }
-  DeviceStatus status() noexcept override { return device_.status(); }
-  HandState hand() noexcept override { return device_.hand(); }
-  void await() noexcept override { device_.await(); }
   void begin() noexcept override {
     begun_ = true;
-    device_.begin();
+    VirtualOmega7::begin();
   }
-  void advance(double seconds) noexcept override { device_.advance(seconds); }
   void stop() noexcept override {
-    device_.stop();
+    VirtualOmega7::stop();
     moments_->forces_off();
   }
   void cut_forces() noexcept override {
-    device_.cut_forces();
+    VirtualOmega7::cut_forces();
     moments_->forces_off();
   }
 
  private:
-  VirtualOmega7 device_;
   ClockHazard hazard_;
   std::shared_ptr<Moments> moments_;
   std::uint64_t period_ = 0;

@@ -51,33 +51,31 @@ struct Hazard {
 };
 
 /// The simulated device, with a fault.
-class FaultyDevice final : public HapticDevice {
+class FaultyDevice final : public VirtualOmega7 {
  public:
-  FaultyDevice(VirtualOmega7& device, const Fault& fault) : device_(device), fault_(fault) {}
+  FaultyDevice(const HilSession& session, const Fault& fault)
+      : VirtualOmega7(session.plant, session.operator_script()), fault_(fault) {}
 
-  const DeviceIdentity& open() override { return device_.open(); }
-  void prepare(const DevicePreparation& preparation) override { device_.prepare(preparation); }
-  void enable_forces() override { device_.enable_forces(); }
   DeviceAnswer read(Eigen::Vector3d& position_m) noexcept override {
     constexpr double kJump_m = 0.05;
     if (begun_) ++period_;
     const bool due = begun_ && fault_.due(period_ - 1);
     if (due && fault_.kind == FaultKind::read) return DeviceAnswer::failed;
     Eigen::Vector3d at_m;
-    const DeviceAnswer answer = device_.read(at_m);
+    const DeviceAnswer answer = VirtualOmega7::read(at_m);
     if (due && fault_.kind == FaultKind::not_a_number) at_m.z() = std::nan("");
     if (due && fault_.kind == FaultKind::frozen) at_m = last_m_;
     if (due && fault_.kind == FaultKind::jump) at_m.z() -= kJump_m;
-    if (due && fault_.kind == FaultKind::forces_off) device_.cut_forces();
+    if (due && fault_.kind == FaultKind::forces_off) cut_forces();
     position_m = last_m_ = at_m;
     return answer;
   }
   DeviceAnswer write(const Eigen::Vector3d& force_N) noexcept override {
     if (due(FaultKind::write)) return DeviceAnswer::failed;
-    return device_.write(force_N);
+    return VirtualOmega7::write(force_N);
   }
   DeviceStatus status() noexcept override {
-    DeviceStatus status = device_.status();
+    DeviceStatus status = VirtualOmega7::status();
     status.failed = due(FaultKind::status);
     if (status.failed || due(FaultKind::read) || due(FaultKind::write)) {
       status.error = fault_.error;
@@ -85,22 +83,16 @@ class FaultyDevice final : public HapticDevice {
     if (due(FaultKind::forces_off)) status.forces_off = fault_.off;
     return status;
   }
-  HandState hand() noexcept override { return device_.hand(); }
-  void await() noexcept override { device_.await(); }
   void begin() noexcept override {
     begun_ = true;
-    device_.begin();
+    VirtualOmega7::begin();
   }
-  void advance(double seconds) noexcept override { device_.advance(seconds); }
-  void stop() noexcept override { device_.stop(); }
-  void cut_forces() noexcept override { device_.cut_forces(); }
 
  private:
   [[nodiscard]] bool due(FaultKind kind) const noexcept {
     return begun_ && fault_.kind == kind && period_ > 0 && fault_.due(period_ - 1);
   }
 
-  VirtualOmega7& device_;
   Fault fault_;
   std::uint64_t period_ = 0;
   bool begun_ = false;
@@ -446,8 +438,7 @@ HazardRow row_of(const Hazard& hazard, bool unchecked, const HazardBounds& bound
       return;
     }
     const ServoSettings servo = loop_settings(session, model, rendering, true);
-    VirtualOmega7 simulated(session.plant, session.operator_script());
-    FaultyDevice device(simulated, hazard.fault);
+    FaultyDevice device(session, hazard.fault);
     device.open();
     device.prepare(session.preparation);
     device.enable_forces();

@@ -16,7 +16,7 @@ inline constexpr CylinderWorkspace kOmega7Workspace{0.080, kOmega7StopAlongX_m};
 /// A simulated Omega.7 held by a simulated arm, or another device of the list whose row says
 /// `plant`. Its time passes in advance() only; in real time its watchdog counts by the clock too,
 /// from enable_forces() on, as that of a device does.
-class VirtualOmega7 final : public HapticDevice {
+class VirtualOmega7 : public HapticDevice {
  public:
   /// @param limits the motors are no stronger, the encoders no finer. The handle stops at the end
   /// of

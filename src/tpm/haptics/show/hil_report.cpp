@@ -20,10 +20,6 @@ std::string mN(double force_N) {
   return significant(1e3 * force_N, 3);
 }
 
-std::string percent(double part, double whole) {
-  return whole > 0.0 ? significant(100.0 * part / whole, 3) + " %" : "-";
-}
-
 /// Every `stride`-th value, so that a curve has at most some thousand points.
 std::vector<double> thinned(const std::vector<double>& values, double scale = 1.0) {
   constexpr std::size_t kPoints = 4000;
@@ -164,10 +160,11 @@ void add_glance(Document& d, const HilRecording& r, const Verification& v,
                                                              : Tone::bad});
     for (std::string& text : rendering->texts()) lines.push_back({std::move(text), Tone::bad});
   }
-  lines.push_back({fmt::format("the force commanded is within {} of the reference, in parts of the "
-                               "session's peak of {} N",
-                               percent(v.all.max_N, v.all.peak_N), significant(v.all.peak_N, 4)),
-                   v.all.max_N <= kMostError * v.all.peak_N ? Tone::good : Tone::bad});
+  lines.push_back(
+      {fmt::format("the force commanded is within {} of the reference, in parts of the "
+                   "session's peak of {} N",
+                   share_words(v.all.max_N, v.all.peak_N), significant(v.all.peak_N, 4)),
+       v.all.max_N <= kMostError * v.all.peak_N ? Tone::good : Tone::bad});
   if (r.session.measured_N.empty()) lines.push_back({experiment_line(v)});
   for (const CrossCheck& o : v.others) {
     if (o.measured) {
@@ -243,7 +240,7 @@ void add_fidelity(Document& d, const Verification& v) {
       "off by {} mN rms and {} mN at most, {} of the session's peak of {} N.",
       v.reference, v.knots, significant(1e6 * v.motion_tolerance_m, 3), motion_cost(v, 1e3, "mN"),
       mN(v.reference_error_N), v.all.instants, mN(v.all.rms_N), mN(v.all.max_N),
-      percent(v.all.max_N, v.all.peak_N), significant(v.all.peak_N, 4)));
+      share_words(v.all.max_N, v.all.peak_N), significant(v.all.peak_N, 4)));
   std::vector<Cell> others;
   for (const CrossCheck& o : v.others) {
     others.push_back(
@@ -325,7 +322,7 @@ ResultTable<PhaseFidelity> phase_table(const Verification& v) {
   const auto force = [](auto member) { return [member](const Row& p) { return p.force.*member; }; };
   const auto of_peak = [=](const Row& p) {
     const bool good = p.force.max_N <= kMostError * peak_N;
-    return Cell{percent(p.force.max_N, peak_N), good ? Tone::good : Tone::bad};
+    return Cell{share_words(p.force.max_N, peak_N), good ? Tone::good : Tone::bad};
   };
   return {{Of("phase", [](const Row& p) { return p.phase.name; }).shown("phase"),
            {"kind", [](const Row& p) { return to_string(p.phase.kind); }},

@@ -31,6 +31,8 @@ namespace tpm::haptics {
 /// comparison, and every note.
 [[nodiscard]] ShortAnswer short_answer(const HilRecording& recording, const Verification& v);
 
+/// Part of a peak in %; "-" of a peak of 0.
+[[nodiscard]] std::string share_words(double part_N, double peak_N);
 /// Force errors of the phases of a verification, and its readings of the experiment.
 [[nodiscard]] ResultTable<PhaseFidelity> phase_table(const Verification& v);
 [[nodiscard]] ResultTable<BesideExperiment> experiment_table(const Verification& v);

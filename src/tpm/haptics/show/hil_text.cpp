@@ -5,9 +5,9 @@
 #include <cmath>
 #include <map>
 #include <optional>
-#include <sstream>
 #include <string_view>
 
+#include "tpm/base/lists.hpp"
 #include "tpm/base/printed_number.hpp"
 #include "tpm/base/sized_unit.hpp"
 #include "tpm/base/text.hpp"
@@ -142,46 +142,39 @@ Json fidelity_json(const ForceFidelity& f) {
           {"peak_N", rounded(f.peak_N)}};
 }
 
-/// None of a peak of 0.
-std::optional<double> share_of(double part_N, double peak_N) {
-  return peak_N > 0.0 ? std::optional(part_N / peak_N) : std::nullopt;
-}
-
-std::string share(double part_N, double peak_N) {
-  const std::optional<double> part = share_of(part_N, peak_N);
-  return part ? significant(100.0 * *part, 3) + " %" : "-";
-}
-
 /// The errors of all phases of one kind.
 struct PhaseKindErrors {
-  int count = 0;
+  std::string kind;
+  std::size_t count = 0, instants = 0;
   double squares = 0.0, max_N = 0.0;
-  std::size_t instants = 0;
   [[nodiscard]] double rms_N() const { return std::sqrt(squares / static_cast<double>(instants)); }
 };
 
-std::map<std::string, PhaseKindErrors> errors_by_kind(const Verification& v) {
+std::vector<PhaseKindErrors> errors_by_kind(const Verification& v) {
   std::map<std::string, PhaseKindErrors> kinds;
   for (const PhaseFidelity& p : v.phases) {
-    PhaseKindErrors& kind = kinds[std::string(to_string(p.phase.kind))];
+    const std::string name(to_string(p.phase.kind));
+    PhaseKindErrors& kind = kinds[name];
+    kind.kind = name;
     ++kind.count;
     kind.squares += p.force.rms_N * p.force.rms_N * static_cast<double>(p.force.instants);
     kind.instants += p.force.instants;
     kind.max_N = std::max(kind.max_N, p.force.max_N);
   }
-  return kinds;
+  return mapped<PhaseKindErrors>(kinds, [](const auto& kind) { return kind.second; });
 }
 
-Json kinds_json(const Verification& v) {
-  Json list = Json::array();
-  for (const auto& [name, kind] : errors_by_kind(v)) {
-    list.push_back({{"kind", name},
-                    {"count", kind.count},
-                    {"rms_N", rounded(kind.rms_N())},
-                    {"max_N", rounded(kind.max_N)},
-                    {"max_over_peak", or_null(share_of(kind.max_N, v.all.peak_N))}});
-  }
-  return list;
+ResultTable<PhaseKindErrors> kind_table(double peak_N) {
+  using Row = PhaseKindErrors;
+  using Of = ResultColumn<Row>;
+  const auto of_peak = [=](const Row& k) {
+    return peak_N > 0.0 ? Json(k.max_N / peak_N) : Json(nullptr);
+  };
+  const auto percent = [=](const Row& k) { return Cell{share_words(k.max_N, peak_N)}; };
+  return {{Of("kind", &Row::kind).shown("phase", -10), Of("count", &Row::count).shown("count", 7),
+           Of("rms_N", &Row::rms_N).shown("rms mN", 10, 1e-3, 3),
+           Of("max_N", &Row::max_N).shown("max mN", 10, 1e-3, 3),
+           Of("max_over_peak", of_peak).shown("max/peak", 10).in_words(percent)}};
 }
 
 /// Time that was verified: of a session that ended early, of how much.
@@ -237,16 +230,6 @@ std::string gate_text(const JitterCheck& check) {
                        : "session: none was named, so none was asked for its tissue\n";
 }
 
-/// Without empty lines.
-std::vector<std::string> each_line(const std::string& text) {
-  std::vector<std::string> lines;
-  std::istringstream in(text);
-  for (std::string line; std::getline(in, line);) {
-    if (!line.empty()) lines.push_back(line);
-  }
-  return lines;
-}
-
 }  // namespace
 
 Json check_json(const JitterCheck& check) {
@@ -298,9 +281,9 @@ std::string check_text(const JitterCheck& check) {
 
 ShortAnswer short_answer(const JitterCheck& check) {
   ShortAnswer answer;
-  answer.conclusion = each_line("timing: " + check.timing + "\n" + gate_text(check));
-  answer.limits = each_line(measured_text(check) + limits_text(check) + check.advice);
-  answer.warnings = each_line(said_by_device(check.outcome, check.findings));
+  answer.conclusion = separate_lines("timing: " + check.timing + "\n" + gate_text(check));
+  answer.limits = separate_lines(measured_text(check) + limits_text(check) + check.advice);
+  answer.warnings = separate_lines(said_by_device(check.outcome, check.findings));
   return answer;
 }
 
@@ -387,10 +370,14 @@ Json verification_json(const HilRecording& recording, const Verification& v) {
           {"reference_error_N", rounded(v.reference_error_N)},
           {"model_error_N", rounded(v.model_error_N)},
           {"all", fidelity_json(v.all)},
-          {"kinds", kinds_json(v)},
+          {"kinds", kind_table(v.all.peak_N).list(errors_by_kind(v))},
           {"phases", phase_table(v).list(v.phases)},
           {"others", others},
           {"experiment", experiment_table(v).list(v.experiment)}};
+}
+
+std::string share_words(double part_N, double peak_N) {
+  return peak_N > 0.0 ? significant(100.0 * part_N / peak_N, 3) + " %" : "-";
 }
 
 std::string motion_cost(const Verification& v, double per_newton, std::string_view unit) {
@@ -405,17 +392,10 @@ std::string verification_text(const HilRecording& recording, const Verification&
       recording.session.title, device_line(recording), verified_words(recording, v), v.reference,
       v.knots, significant(1e6 * v.motion_tolerance_m, 3), motion_cost(v, 1.0, "N"),
       significant(v.reference_error_N, 3));
-  text += fmt::format("{:<10} {:>7} {:>10} {:>10} {:>10}\n", "phase", "count", "rms mN", "max mN",
-                      "max/peak");
-  const std::map<std::string, PhaseKindErrors> kinds = errors_by_kind(v);
-  for (const auto& [name, kind] : kinds) {
-    text += fmt::format("{:<10} {:>7} {:>10} {:>10} {:>10}\n", name, kind.count,
-                        significant(1e3 * kind.rms_N(), 3), significant(1e3 * kind.max_N, 3),
-                        share(kind.max_N, v.all.peak_N));
-  }
-  text += fmt::format("{:<10} {:>7} {:>10} {:>10} {:>10}   peak {} N\n", "all", v.phases.size(),
-                      significant(1e3 * v.all.rms_N, 3), significant(1e3 * v.all.max_N, 3),
-                      share(v.all.max_N, v.all.peak_N), significant(v.all.peak_N, 4));
+  const ResultTable<PhaseKindErrors> table = kind_table(v.all.peak_N);
+  text += table.text(errors_by_kind(v)) +
+          table.line({"all", v.phases.size(), 1, v.all.rms_N * v.all.rms_N, v.all.max_N}) +
+          fmt::format("   peak {} N\n", significant(v.all.peak_N, 4));
   for (const Remark& remark : all_remarks(recording, v)) text += "note: " + remark.text + "\n";
   for (const CrossCheck& o : v.others) {
     text += fmt::format("beside: {}, {} to {} s: rms {} mN, max {} mN; {} mN from the reference\n",
@@ -439,8 +419,9 @@ ShortAnswer short_answer(const HilRecording& recording, const Verification& v) {
   answer.conclusion = {
       fmt::format("{}: the force commanded differs from the reference by {} at most ({} of the "
                   "peak of {}), rms {}",
-                  recording.session.title, newtons(v.all.max_N), share(v.all.max_N, v.all.peak_N),
-                  newtons(v.all.peak_N, 4), newtons(v.all.rms_N)),
+                  recording.session.title, newtons(v.all.max_N),
+                  share_words(v.all.max_N, v.all.peak_N), newtons(v.all.peak_N, 4),
+                  newtons(v.all.rms_N)),
       device_line(recording),
       fmt::format("reference: {}; {}, {} instants", v.reference, verified_words(recording, v),
                   v.all.instants)};
@@ -449,9 +430,9 @@ ShortAnswer short_answer(const HilRecording& recording, const Verification& v) {
     return fmt::format("{:<10} {:>7} {:>12} {:>12} {:>10}", phase, count, rms, most, of_peak);
   };
   answer.head = {row("phase", "count", "rms", "max", "max/peak")};
-  for (const auto& [name, kind] : errors_by_kind(v)) {
-    answer.rows.push_back(row(name, std::to_string(kind.count), newtons(kind.rms_N()),
-                              newtons(kind.max_N), share(kind.max_N, v.all.peak_N)));
+  for (const PhaseKindErrors& k : errors_by_kind(v)) {
+    answer.rows.push_back(row(k.kind, std::to_string(k.count), newtons(k.rms_N()), newtons(k.max_N),
+                              share_words(k.max_N, v.all.peak_N)));
   }
   answer.limits = {
       fmt::format("limit: motion through {} knots within {}, {}; the reference's own error "

@@ -200,7 +200,7 @@ void Recorder::keep(const QuasiStaticState& state, const Eigen::VectorXd& contac
 
 /// Linear springs carry any load, somewhere.
 void Recorder::require_within(const QuasiStaticState& state) const {
-  if (scene_.protocol.drive() == Drive::displacement) return;
+  if (scene_.by_depth()) return;
   const double room = tissue_behind_m(scene_.tissue.network.organ, scene_.probe());
   if (state.response < room) return;
   throw Error(ExitCode::numerical, "network",

@@ -117,7 +117,7 @@ void require_runnable(const ExperimentScene& scene) {
   const auto needs = [&](bool needed, bool Capabilities::*capability) {
     if (needed) require_can<SceneRunner>(entry, capability, choice.where);
   };
-  const bool by_depth = scene.protocol.drive() == Drive::displacement;
+  const bool by_depth = scene.by_depth();
   needs(by_depth, &Capabilities::depth);
   needs(!by_depth, &Capabilities::load);
   needs(!scene.tissue.star || choice.mass_spring, &Capabilities::network);

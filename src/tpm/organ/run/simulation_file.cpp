@@ -133,7 +133,7 @@ void write_curve(const ExperimentScene& scene, const SimulationRecord& record, H
     settling.push_back(p.settling ? 1 : 0);
     on_tissue.push_back(p.force_on_tissue_N);
   }
-  const bool depth = scene.protocol.drive() == Drive::displacement;
+  const bool depth = scene.by_depth();
   file.numbers("/curve/time_s", time);
   file.numbers(depth ? "/curve/depth_m" : "/curve/load_N", imposed);
   file.numbers(depth ? "/curve/force_N" : "/curve/depth_m", response);

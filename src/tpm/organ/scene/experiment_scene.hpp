@@ -85,6 +85,7 @@ struct ExperimentScene {
 
   /// Some contact besides the first has a protocol of its own.
   [[nodiscard]] bool has_own_protocols() const;
+  [[nodiscard]] bool by_depth() const { return protocol.drive() == Drive::displacement; }
   /// True if the motion of the contact is imposed. The mass of such a tool changes no force on the
   /// tissue.
   [[nodiscard]] bool imposes_depth(const SceneContact& contact) const;

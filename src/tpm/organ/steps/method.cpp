@@ -316,65 +316,37 @@ void require_valid(const MethodMasses& mass, std::size_t spheres) {
   }
 }
 
-class ElementProblem final : public MethodProblem {
- public:
-  ElementProblem(BondElement material, Protocol protocol, std::optional<MethodMasses> mass)
-      : material_(std::move(material)), protocol_(std::move(protocol)), mass_(std::move(mass)) {
-    require_one_branch(material_, "element");
-    if (mass_) require_valid(*mass_, 1);
-  }
-
-  [[nodiscard]] const Protocol& protocol() const override { return protocol_; }
-  [[nodiscard]] MethodRun run(const MethodSettings& settings,
-                              std::span<const double> times_s) const override {
-    require_valid(settings);
-    require_times(protocol_, times_s);
-    const auto system = element_system(material_, protocol_, mass_);
-    return run_method(*system, protocol_, settings, times_s);
-  }
-
- private:
-  BondElement material_;
-  Protocol protocol_;
-  std::optional<MethodMasses> mass_;
-};
-
-class NetworkProblem final : public MethodProblem {
- public:
-  NetworkProblem(const DrivenNetwork& network, Protocol protocol, std::optional<MethodMasses> mass)
-      : network_(network), protocol_(std::move(protocol)), mass_(std::move(mass)) {
-    if (!network_.tools.empty() || network_.bonds.contact_count() > 0) {
-      throw bad_input("network", "contacts with tools", "spheres that are driven themselves");
-    }
-    require_valid(network_.probes, network_.constraints);
-    if (mass_) require_valid(*mass_, network_.spheres());
-  }
-
-  [[nodiscard]] const Protocol& protocol() const override { return protocol_; }
-  [[nodiscard]] MethodRun run(const MethodSettings& settings,
-                              std::span<const double> times_s) const override {
-    require_valid(settings);
-    require_times(protocol_, times_s);
-    const auto system = network_system(network_, protocol_, mass_);
-    return run_method(*system, protocol_, settings, times_s);
-  }
-
- private:
-  const DrivenNetwork& network_;
-  Protocol protocol_;
-  std::optional<MethodMasses> mass_;
-};
-
 }  // namespace
+
+MethodRun MethodProblem::run(const MethodSettings& settings,
+                             std::span<const double> times_s) const {
+  require_valid(settings);
+  require_times(protocol_, times_s);
+  const auto system = equations_(protocol_);
+  return run_method(*system, protocol_, settings, times_s);
+}
 
 std::unique_ptr<MethodProblem> element_problem(const BondElement& material, Protocol protocol,
                                                std::optional<MethodMasses> mass) {
-  return std::make_unique<ElementProblem>(material, std::move(protocol), std::move(mass));
+  require_one_branch(material, "element");
+  if (mass) require_valid(*mass, 1);
+  return std::make_unique<MethodProblem>(
+      std::move(protocol), [material, mass = std::move(mass)](const Protocol& moved_by) {
+        return element_system(material, moved_by, mass);
+      });
 }
 
 std::unique_ptr<MethodProblem> network_problem(const DrivenNetwork& network, Protocol protocol,
                                                std::optional<MethodMasses> mass) {
-  return std::make_unique<NetworkProblem>(network, std::move(protocol), std::move(mass));
+  if (!network.tools.empty() || network.bonds.contact_count() > 0) {
+    throw bad_input("network", "contacts with tools", "spheres that are driven themselves");
+  }
+  require_valid(network.probes, network.constraints);
+  if (mass) require_valid(*mass, network.spheres());
+  return std::make_unique<MethodProblem>(
+      std::move(protocol), [&network, mass = std::move(mass)](const Protocol& moved_by) {
+        return network_system(network, moved_by, mass);
+      });
 }
 
 }  // namespace tpm::organ

@@ -2,11 +2,13 @@
 // The methods that step an element or a network through a protocol, behind one interface.
 #include <Eigen/Core>
 #include <array>
+#include <functional>
 #include <memory>
 #include <optional>
 #include <span>
 #include <string>
 #include <string_view>
+#include <utility>
 
 #include "tpm/organ/balance/driven_network.hpp"
 #include "tpmkit/bond_element.hpp"
@@ -108,16 +110,24 @@ struct MethodMasses {
   double drag_per_s = 0.0;  ///< force -drag m v, >= 0
 };
 
+class StepSystem;
+
 /// An element or a network with its protocol: what a method steps. Without masses forces balance at
 /// each instant and only viscous elongations have a rate; with masses spheres move by Newton's law.
 class MethodProblem {
  public:
-  virtual ~MethodProblem() = default;
-  [[nodiscard]] virtual const Protocol& protocol() const = 0;
+  using Equations = std::function<std::unique_ptr<StepSystem>(const Protocol&)>;
+  MethodProblem(Protocol protocol, Equations equations)
+      : protocol_(std::move(protocol)), equations_(std::move(equations)) {}
+  [[nodiscard]] const Protocol& protocol() const { return protocol_; }
   /// @param times_s rising, within the protocol
   /// Throws Error(bad_input) for settings out of range; what a method cannot do is in the result.
-  [[nodiscard]] virtual MethodRun run(const MethodSettings& settings,
-                                      std::span<const double> times_s) const = 0;
+  [[nodiscard]] MethodRun run(const MethodSettings& settings,
+                              std::span<const double> times_s) const;
+
+ private:
+  Protocol protocol_;
+  Equations equations_;
 };
 
 /// One sphere on an element with one branch, moved along its normal.

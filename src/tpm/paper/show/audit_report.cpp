@@ -87,13 +87,7 @@ std::vector<std::string> verdict_lines(const AuditReport& report,
   std::string all = fmt::format("{:<21}{:>4}  {}", verdict.text, report.count(verdict.meaning),
                                 wrapped(names, kWidth + 16, kNames, kNames));
   all.erase(all.find_last_not_of(' ') + 1);
-  std::vector<std::string> lines;
-  for (std::size_t from = 0; from < all.size();) {
-    const std::size_t end = std::min(all.find('\n', from), all.size());
-    lines.push_back(all.substr(from, end - from));
-    from = end + 1;
-  }
-  return lines;
+  return separate_lines(all);
 }
 
 /// Findings with another number, the largest difference first.

@@ -42,7 +42,7 @@ class ElementFormulation final : public Formulation, public ModelMaker, public S
             .value;
     answer.steps = static_cast<double>(times_s.size());
     if (!with_field) return answer;
-    const bool by_depth = scene.protocol.drive() == Drive::displacement;
+    const bool by_depth = scene.by_depth();
     const Probe& probe = scene.probe();
     for (std::size_t i = 0; i < times_s.size(); ++i) {
       Eigen::Matrix3Xd moved = Eigen::Matrix3Xd::Zero(3, network.network.organ.position.cols());

@@ -224,15 +224,10 @@ std::string subject_text(const Plan& plan) {
   return text;
 }
 
-/// The lines of a text, without those that are empty and without blanks before them.
+/// The lines of a text, without blanks before them.
 std::vector<std::string> text_lines(const std::string& text) {
-  std::vector<std::string> lines;
-  for (std::size_t from = 0; from < text.size();) {
-    const std::size_t end = std::min(text.find('\n', from), text.size());
-    const std::size_t word = text.find_first_not_of(' ', from);
-    if (word < end) lines.push_back(text.substr(word, end - word));
-    from = end + 1;
-  }
+  std::vector<std::string> lines = separate_lines(text);
+  for (std::string& line : lines) line.erase(0, line.find_first_not_of(' '));
   return lines;
 }
 

@@ -68,7 +68,7 @@ Json state_json(const FiguredRun& figured) {
   json["largest_bond_force_mN"] =
       list_json(largest_bond_forces_N(figured.network->network, force), 1e-3);
   json["validity"] = ValidityWatch(*figured.scene).flags(position);
-  const bool depth = figured.scene->protocol.drive() == Drive::displacement;
+  const bool depth = figured.scene->by_depth();
   const double depth_m = depth ? state.imposed : state.response;
   const double force_N = depth ? state.response : state.imposed;
   json["summary"] = fmt::format("t = {} s, depth {} mm, force {} N", significant(state.time_s, 4),
@@ -85,8 +85,7 @@ std::string contact_name(const FiguredRun& figured, std::size_t sphere) {
 std::vector<Series> beside_series(const FiguredRun& figured, const std::vector<double>& time_s,
                                   bool imposed) {
   const ExperimentScene& scene = *figured.scene;
-  const bool by_depth = scene.protocol.drive() == Drive::displacement;
-  const double per_unit = imposed == by_depth ? 1e3 : 1.0;
+  const double per_unit = imposed == scene.by_depth() ? 1e3 : 1.0;
   std::vector<Series> series;
   std::size_t index = 0;
   for (std::size_t i = 1; i < scene.contacts.size(); ++i) {
@@ -104,8 +103,7 @@ std::vector<Series> beside_series(const FiguredRun& figured, const std::vector<d
 }
 
 Panel panel_of(const std::vector<FiguredRun>& runs, bool imposed) {
-  const bool by_depth = runs.front().scene->protocol.drive() == Drive::displacement;
-  const bool length = imposed == by_depth;
+  const bool length = imposed == runs.front().scene->by_depth();
   Panel panel{.title = imposed ? "Imposed" : "Response",
               .x = {"time", "s"},
               .y = length ? Axis{"indentation depth", "mm"}

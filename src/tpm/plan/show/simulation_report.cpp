@@ -10,20 +10,15 @@
 
 #include "tpm/base/sized_unit.hpp"
 #include "tpm/base/text.hpp"
-#include "tpm/files/file.hpp"
 #include "tpm/organ/run/smoothness.hpp"
 #include "tpm/plan/show/simulation_remarks.hpp"
-#include "tpmkit/version.hpp"
+#include "tpm/plan/show/trajectory_report.hpp"
 
 namespace tpm::plan {
 namespace {
 
 double nine_digits(double value) {
   return rounded(value, 9);
-}
-
-bool by_depth(const ExperimentScene& scene) {
-  return scene.protocol.drive() == Drive::displacement;
 }
 
 /// The impact that the tissue feels most; none if there is none.
@@ -84,7 +79,7 @@ Json motion_json(const ExperimentScene& scene, const SimulationRun& run) {
         {"impulse_on_tissue_N_s", nine_digits(most->impulse_on_tissue_N_s)},
         {"impulse_of_probe_N_s", nine_digits(most->impulse_N_s)}};
   }
-  if (!by_depth(scene)) {
+  if (!scene.by_depth()) {
     const CurvePoint& most = hardest(run.record);
     json["largest_force_on_tissue"] = {{"time_s", nine_digits(most.time_s)},
                                        {"force_N", nine_digits(most.force_on_tissue_N)}};
@@ -283,7 +278,7 @@ std::string validity_text(const Validity& validity, bool depth_limits,
 
 std::string motion_text(const ExperimentScene& scene, const SimulationRun& run) {
   std::string text;
-  if (!by_depth(scene)) {
+  if (!scene.by_depth()) {
     const CurvePoint& most = hardest(run.record);
     text += fmt::format("largest force on the tissue: {}, at {} s\n",
                         sized_text(Dimension::force, most.force_on_tissue_N, 6),
@@ -300,12 +295,12 @@ std::string motion_text(const ExperimentScene& scene, const SimulationRun& run) 
   }
   if (!run.contact_check) return text;
   const ContactCheck& check = *run.contact_check;
-  const Dimension of = by_depth(scene) ? Dimension::force : Dimension::length;
+  const Dimension of = scene.by_depth() ? Dimension::force : Dimension::length;
   const auto pair = [&](double here, double softer) {
     return fmt::format("{} instead of {}", sized_text(of, softer, 6), sized_text(of, here, 6));
   };
   text += fmt::format("with contacts {} times softer the largest {} is {}, that at the end {}",
-                      shortest(ContactCheck::kSofter), by_depth(scene) ? "force" : "depth",
+                      shortest(ContactCheck::kSofter), scene.by_depth() ? "force" : "depth",
                       pair(check.largest, check.largest_softer), pair(check.end, check.end_softer));
   text += fmt::format("; the curves differ by {} % of the largest at one time\n",
                       significant(100.0 * check.at_one_time, 3));
@@ -351,7 +346,7 @@ std::string solver_text(const SolverChoice& solver) {
 std::string scene_text(const ExperimentScene& scene) {
   std::string text = fmt::format("{}: sphere {} of {} is {}\n", scene.tissue.title,
                                  scene.probe().sphere + 1, scene.tissue.network.organ.size(),
-                                 by_depth(scene) ? "pushed to a depth" : "loaded");
+                                 scene.by_depth() ? "pushed to a depth" : "loaded");
   for (const std::string& load : scene.load_words) {
     text += fmt::format("before and all along: {}\n", load);
   }
@@ -360,7 +355,7 @@ std::string scene_text(const ExperimentScene& scene) {
 
 /// The largest response, and the last one.
 std::string response_text(const ExperimentScene& scene, const SimulationRecord& record) {
-  const bool depth = by_depth(scene);
+  const bool depth = scene.by_depth();
   const auto response = [&](const CurvePoint& p) {
     return fmt::format("{} {} {}",
                        sized_text(depth ? Dimension::force : Dimension::length, p.response, 6),
@@ -378,44 +373,20 @@ std::string resumed_text(const SimulationRun& run) {
   return fmt::format("resumed at {} s from a checkpoint\n", significant(*run.resumed_at_s, 4));
 }
 
-std::vector<std::string> separate_lines(std::string_view text) {
-  std::vector<std::string> lines;
-  while (!text.empty()) {
-    const std::string_view line = text.substr(0, text.find('\n'));
-    text.remove_prefix(std::min(line.size() + 1, text.size()));
-    lines.emplace_back(line);
-  }
-  return lines;
-}
-
 }  // namespace
 
 Json simulation_json(const ExperimentScene& scene, const RunNetwork& network,
                      const SimulationRun& run) {
   const FormulationChoice& f = scene.formulation;
   const SimulationRecord& record = run.record;
-  const bool depth = by_depth(scene);
-  Json json{{"title", scene.tissue.title},
-            {"version", version()},
-            {"scene_sha256", sha256_hex(scene.text)},
-            {"network", f.mass_spring ? "mass_spring" : "tissue"},
-            {"formulation", f.kind},
-            {"tolerance", f.tolerance},
-            {"spheres", scene.tissue.network.organ.size()},
-            {"bonds", scene.tissue.network.bonds.size()},
-            {"loads", scene.load_words},
-            {"contacts", contacts_json(scene, network, run)},
-            {"largest_overlap_m", largest_overlap_json(network, run)},
-            {"imposed", depth ? "depth_m" : "load_N"},
-            {"response", depth ? "force_N" : "depth_m"}};
-  const auto point = [](const CurvePoint& p) {
-    return Json{{"time_s", nine_digits(p.time_s)},
-                {"imposed", nine_digits(p.imposed)},
-                {"response", nine_digits(p.response)}};
-  };
-  json["largest"] = point(largest_point(record.curve, f.tolerance));
-  json["last"] = point(record.curve.back());
-  json["outputs"] = record.outputs.size();
+  Json json = scene_run_members(scene);
+  json["spheres"] = scene.tissue.network.organ.size();
+  json["bonds"] = scene.tissue.network.bonds.size();
+  json["loads"] = scene.load_words;
+  json["contacts"] = contacts_json(scene, network, run);
+  json["largest_overlap_m"] = largest_overlap_json(network, run);
+  add_course(json, scene, largest_point(record.curve, f.tolerance), record.curve.back(),
+             record.outputs.size());
   json["energy"] = energy_json(run);
   if (f.masses) json["motion"] = motion_json(scene, run);
   if (run.solver) json["solver"] = solver_json(*run.solver);

@@ -36,9 +36,7 @@ std::vector<std::size_t> stored_steps(const ExperimentScene& scene,
   return steps;
 }
 
-bool driven_by_depth(const ExperimentScene& scene) {
-  return scene.protocol.drive() == Drive::displacement;
-}
+}  // namespace
 
 Json scene_run_members(const ExperimentScene& scene) {
   return {{"title", scene.tissue.title},
@@ -49,21 +47,28 @@ Json scene_run_members(const ExperimentScene& scene) {
           {"tolerance", scene.formulation.tolerance}};
 }
 
-}  // namespace
+void add_course(Json& json, const ExperimentScene& scene, const CurvePoint& largest,
+                const CurvePoint& last, std::size_t outputs) {
+  const auto point = [](const CurvePoint& p) {
+    return Json{{"time_s", rounded(p.time_s, kRunDigits)},
+                {"imposed", rounded(p.imposed, kRunDigits)},
+                {"response", rounded(p.response, kRunDigits)}};
+  };
+  json["imposed"] = scene.by_depth() ? "depth_m" : "load_N";
+  json["response"] = scene.by_depth() ? "force_N" : "depth_m";
+  json["largest"] = point(largest);
+  json["last"] = point(last);
+  json["outputs"] = outputs;
+}
 
 void add_trajectory(Json& json, const ExperimentScene& scene, const std::vector<double>& times_s,
                     const Trajectory& answer) {
   const auto point = [&](Eigen::Index i) {
     const double time = times_s[static_cast<std::size_t>(i)];
-    return Json{{"time_s", rounded(time, kRunDigits)},
-                {"imposed", rounded(value_at(scene.protocol, time), kRunDigits)},
-                {"response", rounded(answer.response[i], kRunDigits)}};
+    return CurvePoint{time, value_at(scene.protocol, time), answer.response[i], {}};
   };
-  json["imposed"] = driven_by_depth(scene) ? "depth_m" : "load_N";
-  json["response"] = driven_by_depth(scene) ? "force_N" : "depth_m";
-  json["largest"] = point(largest_of(answer));
-  json["last"] = point(answer.response.size() - 1);
-  json["outputs"] = stored_steps(scene, times_s, answer).size();
+  add_course(json, scene, point(largest_of(answer)), point(answer.response.size() - 1),
+             stored_steps(scene, times_s, answer).size());
 }
 
 std::string trajectory_text(bool by_depth, const std::vector<double>& times_s,
@@ -80,7 +85,7 @@ std::string trajectory_text(bool by_depth, const std::vector<double>& times_s,
 
 void write_trajectory(const ExperimentScene& scene, const std::vector<double>& times_s,
                       const Trajectory& answer, Hdf5Writer& file) {
-  const bool by_depth = driven_by_depth(scene);
+  const bool by_depth = scene.by_depth();
   const auto imposed =
       mapped<double>(times_s, [&](double time) { return value_at(scene.protocol, time); });
   const std::vector<double> response(answer.response.begin(), answer.response.end());
@@ -112,7 +117,7 @@ std::string scene_run_text(const ExperimentScene& scene, const std::vector<doubl
       "{}: {}\n{}: {}\n{}limits of validity are not watched: this formulation does not show whole "
       "states\n",
       scene.tissue.title, scene.formulation.mass_spring ? "mass-spring model" : "tissue",
-      entry.name(), entry.meaning(), trajectory_text(driven_by_depth(scene), times_s, answer));
+      entry.name(), entry.meaning(), trajectory_text(scene.by_depth(), times_s, answer));
 }
 
 void write_scene_run(const ExperimentScene& scene, const std::vector<double>& times_s,

@@ -10,7 +10,12 @@
 
 namespace tpm::plan {
 
-/// Adds what is imposed, the response, its largest and last value to a description of a run.
+/// Scene, formulation and tolerance of a run.
+[[nodiscard]] Json scene_run_members(const ExperimentScene& scene);
+/// Adds what is imposed, the response, its largest and last value and the number of outputs to a
+/// description of a run.
+void add_course(Json& json, const ExperimentScene& scene, const CurvePoint& largest,
+                const CurvePoint& last, std::size_t outputs);
 void add_trajectory(Json& json, const ExperimentScene& scene, const std::vector<double>& times_s,
                     const Trajectory& answer);
 /// The same in a line.
