@@ -14,9 +14,12 @@ namespace fs = std::filesystem;
 namespace {
 
 /// Options, besides arguments without a name, whose value is a file that the command reads.
-constexpr std::array<std::string_view, 8> kReading{
-    "--scene", "--session",       "--law",         "--budget-file",
-    "--costs", "--configuration", "--device-file", "--instrument"};
+constexpr std::array<std::string_view, 12> kReading{"--scene",        "--session",
+                                                    "--law",          "--budget-file",
+                                                    "--costs",        "--configuration",
+                                                    "--device-file",  "--instrument",
+                                                    "--finer",        "--calibration-instrument",
+                                                    "--at-recording", "--replay-motion"};
 
 bool reads_a_file(const CLI::Option& option) {
   if (option.get_items_expected_max() == 0) return false;  // a flag

@@ -124,6 +124,17 @@ def shipped_stand_in(tpm, work):
     check("using" not in run.stderr, run.stderr)
     run = tpm(empty, "network", "check", "configs/nothing.json", code=3)
     check("using" not in run.stderr and "configs/nothing.json" in run.stderr, run.stderr)
+    # Files that options name, too.
+    organ, recording = "configs/budget_liver.json", "configs/recording_example/recording.csv"
+    for words, read in ((("budget", "none.json", "--scene", organ, "--finer"), organ),
+                        (("validate", "none.json", recording, "--at-recording"), recording),
+                        (("validate", "none.json", recording, "--calibration-instrument"), organ),
+                        (("hil", "run", "none.json", "-o", "none.tpmrec", "--replay-motion"), recording)):
+        run = tpm(empty, *words, read, code=3)
+        files = [word for word in (*words, read) if word.startswith("configs/")]
+        told = [line for line in run.stderr.splitlines() if "is not here: using" in line]
+        check(sorted(told) == sorted(f"tpm: {file} is not here: using the one that comes with tpm, {share.parent.parent / file}"
+                                     for file in files), run.stderr)
     # What is written stays where the user says.
     tpm(empty, "schema", "scene")
     tpm(empty, "paper", "audit", "-o", "configs/liver_scene.json", "--format", "json")

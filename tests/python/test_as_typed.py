@@ -1,7 +1,9 @@
 """What users type: tables as they come out of pandas and xarray, numbers of numpy, arguments that are wrong."""
 
+import copy
 import html
 import json
+import pickle
 import subprocess
 import sys
 import tempfile
@@ -54,6 +56,66 @@ class Tables(unittest.TestCase):
         page = html.unescape(self.fit._repr_html_())
         for words in (self.fit.adequacy["summary"], *self.fit.warnings):
             self.assertIn(words, page)
+
+    def test_attributes_of_a_dataset_tell_its_units(self):
+        plain = self.table.set_axis(["time", "depth", "force"], axis=1).set_index("time").to_xarray()
+        for name, unit in UNITS.items():
+            plain[name].attrs["units"] = unit
+        self.assertTrue(tpmkit.fit(plain, **QUICK).parameters.equals(self.fit.parameters))
+        milli = plain.assign(force=(1e3 * plain.force).assign_attrs(units="mN"))
+        by_milli = tpmkit.fit(milli, **QUICK).parameters.estimate
+        for name, value in self.fit.parameters.estimate.items():
+            self.assertAlmostEqual(by_milli[name] / value, 1.0, places=3)
+        for data, units, words in (
+            (milli, {"force": "N"}, "force is in mN by its attribute and units says N; expected the same"),
+            (milli.rename(force="force (N)"), None, r"force \(N\) is in mN by its attribute and its name says N"),
+            (milli.rename(force="force_N"), None, "force_N is in mN by its attribute and its name says N"),
+        ):
+            with self.subTest(words=words), self.assertRaisesRegex(tpmkit.ArgumentError, "^fit: " + words):
+                tpmkit.fit(data, units=units, **QUICK)
+
+    def test_what_is_wrong_in_a_table_is_told_by_its_rows_and_arguments(self):
+        back = self.table.copy()
+        back.loc[30, "time (s)"] = back.loc[28, "time (s)"]
+        nameless = self.table.set_axis(["t", "z", "F"], axis=1)
+        for call, words in (
+            (lambda: tpmkit.fit(back, **QUICK), "^table: row 30: time "),
+            (lambda: tpmkit.fit(nameless, **QUICK), r'expected units=\{"t": UNIT\} with a unit of time'),
+            (lambda: tpmkit.fit(pd.DataFrame(self.table.to_numpy())), "a column of the table has the name 0; expected texts with units"),
+            (lambda: tpmkit.fit(self.table.set_axis(["0", "1", "2"], axis=1)), "has the name '0'"),
+            (lambda: tpmkit.fit(self.table + 0j), r"time \(s\) holds complex128; expected numbers"),
+            (lambda: tpmkit.fit(self.table * np.nan), "the table has 501 rows and 3 columns, and no number"),
+            (lambda: tpmkit.fit(self.table.to_xarray()["force (N)"].rename(None)), "^fit: a DataArray; expected a Dataset"),
+            (lambda: tpmkit.fit(self.table, columns={"decimal": "comma"}), "columns names decimal, which says how a file is written"),
+            (lambda: tpmkit.validate(self.fit, self.table, columns={"header_rows": 1}), "^validate: columns names header_rows"),
+        ):
+            with self.subTest(words=words), self.assertRaisesRegex(tpmkit.ArgumentError, words) as raised:
+                call()
+            self.assertNotIn("\n", str(raised.exception))
+
+    def test_arrays_of_any_kind_of_number_are_fitted_alike(self):
+        time, depth, force = (self.table[c].to_numpy() for c in self.table.columns)
+        wide = np.column_stack([time, depth, force])
+        fixed = [column.copy() for column in (time, depth, force)]
+        for column in fixed:
+            column.flags.writeable = False
+        for arrays in ((time.tolist(), tuple(depth), pd.Series(force, index=range(7, 508))), wide.T, fixed,
+                       (time.astype(">f8"), pd.array(depth), pd.Series(force, dtype="Float64"))):
+            fit = tpmkit.fit(**dict(zip(UNITS, arrays)), units=UNITS, **QUICK)
+            self.assertTrue(fit.parameters.equals(self.fit.parameters))
+        missing = pd.Series(force, dtype="Float64")
+        missing[3] = pd.NA
+        for unit in (None, "", 3):
+            with self.assertRaisesRegex(tpmkit.ArgumentError, "^fit: units has 'force': "):
+                tpmkit.fit(time=time, depth=depth, force=force, units={**UNITS, "force": unit})
+        with self.assertRaisesRegex(tpmkit.ArgumentError, "^fit: force is NaN at place 3; expected numbers$"):
+            tpmkit.fit(time=time, depth=depth, force=missing, units=UNITS)
+
+    def test_tables_that_follow_from_a_fit_are_pickled_and_copied(self):
+        table = self.fit.predict(tpmkit.Protocol.ramp_and_hold(9e-3, 1e-3, 10.0), [0.0, 9.0])
+        for again in (pickle.loads(pickle.dumps(table)), copy.copy(table), copy.deepcopy(table)):
+            self.assertTrue(again.equals(table))
+            self.assertEqual((again.warnings, again.adequacy, repr(again)), (table.warnings, table.adequacy, repr(table)))
 
     def test_a_filtered_table_is_fitted(self):
         rows = self.table[self.table["time (s)"] < 10.0]

@@ -1,6 +1,9 @@
 """Folders, validation, designs and pages: what the program does for Python. What is imported."""
 
+import copy
 import json
+import pickle
+import resource
 import subprocess
 import sys
 import tempfile
@@ -9,6 +12,10 @@ from pathlib import Path
 
 import made
 import tpmkit
+
+
+def alike(one, other):
+    return (repr(one), one.to_dict(), one.warnings, one.adequacy) == (repr(other), other.to_dict(), other.warnings, other.adequacy)
 
 
 class Judgements(unittest.TestCase):
@@ -40,6 +47,8 @@ class Judgements(unittest.TestCase):
             self.assertEqual(row.only_if_described, p.get("only_if_described", False))
             self.assertEqual(row.only_without, p.get("only_without", {}).get("text", ""))
         self.assertEqual(pooled.pooled.loc["k_inf", "only_without"], "drift or a slow branch")
+        for again in (pickle.loads(pickle.dumps(pooled)), copy.deepcopy(pooled)):
+            self.assertTrue(alike(again, pooled))
         spoilt = pooled.to_dict()
         spoilt["pooled"][0].update({"identified": False, "only_if_described": True})
         self.assertTrue(type(pooled)(spoilt).pooled.iloc[0].only_if_described)
@@ -61,6 +70,8 @@ class Judgements(unittest.TestCase):
         self.assertIn(judged.summary, repr(judged))
         for warning in judged.warnings:
             self.assertIn(warning, repr(judged))
+        for again in (pickle.loads(pickle.dumps(judged)), copy.deepcopy(judged)):
+            self.assertTrue(alike(again, judged))
         seen = tpmkit.validate(saved / "law.json", self.folder / "liver_1.csv", require="5%")
         self.assertEqual(seen.verdict, "calibration_residual")
         with self.assertRaisesRegex(tpmkit.Error, "new_specimen: the law was fitted to 1 recording"):
@@ -82,6 +93,8 @@ class Judgements(unittest.TestCase):
         self.assertTrue(found.summary)
         for words in (found.adequacy["summary"], *found.warnings):
             self.assertIn(words, repr(found))
+        for again in (pickle.loads(pickle.dumps(found)), copy.deepcopy(found)):
+            self.assertTrue(alike(again, found))
         with self.assertRaisesRegex(tpmkit.Error, "expected"):
             tpmkit.design({**problem, "critreion": "D"}, repetitions=0)
 
@@ -90,6 +103,15 @@ class Judgements(unittest.TestCase):
         loaded = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout.split()
         for module in ("pandas", "xarray", "matplotlib", "scipy", "h5py"):
             self.assertNotIn(module, loaded)
+
+    def test_an_import_takes_less_than_300_ms_of_processor_time(self):
+        times = []
+        for _ in range(5):
+            before = resource.getrusage(resource.RUSAGE_CHILDREN)
+            subprocess.run([sys.executable, "-c", "import tpmkit"], check=True)
+            after = resource.getrusage(resource.RUSAGE_CHILDREN)
+            times.append(after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime)
+        self.assertLess(min(times), 0.3)
 
 
 if __name__ == "__main__":

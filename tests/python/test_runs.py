@@ -151,6 +151,9 @@ class Runs(unittest.TestCase):
             tpmkit.simulate("none.json")
         with self.assertRaisesRegex(tpmkit.Error, "none.h5"):
             tpmkit.open("none.h5")
+        for call in (tpmkit.open, tpmkit.simulate, tpmkit.example):
+            with self.assertRaisesRegex(tpmkit.ArgumentError, rf"^{call.__name__}\(b'none.h5'\): "):
+                call(b"none.h5")
         with self.assertRaisesRegex(tpmkit.Error, "expected one of .*liver_poke.json"):
             tpmkit.example("configs/none.json")
         with self.assertRaisesRegex(tpmkit.Error, "expected a file of configs/ or data/"):
@@ -181,6 +184,8 @@ class Plans(unittest.TestCase):
             self.assertIn(words, str(plan))
         for words in (plan.adequacy["summary"], *plan.warnings):
             self.assertIn(words, repr(plan))
+        for again in (pickle.loads(pickle.dumps(plan)), copy.deepcopy(plan)):
+            self.assertEqual((repr(again), str(again), again.to_dict()), (repr(plan), str(plan), plan.to_dict()))
         self.assertTrue(chosen.feasible)
         self.assertLess(chosen.verified_error, 0.01)
         self.assertEqual(plan.to_dict()["tolerance"], 0.01)

@@ -40,19 +40,19 @@ def with_units(data: xarray.Dataset) -> xarray.Dataset:
 
 
 @told
-def example(name: str) -> Path:
+def example(name: str | os.PathLike[str]) -> Path:
     """A file that comes with tpmkit, by its path, ``example("configs/liver_poke.json")``, or by its name alone,
     ``example("recording.csv")``. Raises tpmkit.Error if there is none, or several of that name."""
-    share = Path(_core.share_dir())
-    path = share / os.fspath(name)
+    asked, share = Path(name), Path(_core.share_dir())
+    path = share / asked
     if path.is_file() and path.resolve().is_relative_to(share.resolve()):
         return path
-    if Path(name).name != name:
+    if asked.name != str(asked):
         folder = path.parent
         inside = folder.is_dir() and folder.resolve().is_relative_to(share.resolve())
         there = sorted(p.name for p in folder.iterdir() if p.is_file()) if inside else []
     else:
-        found = [p for folder in ("configs", "data") for p in sorted((share / folder).rglob("*")) if p.is_file() and p.name == name]
+        found = [p for folder in ("configs", "data") for p in sorted((share / folder).rglob("*")) if p.is_file() and p.name == asked.name]
         if len(found) == 1:
             return found[0]
         there = [str(p.relative_to(share)) for p in found]

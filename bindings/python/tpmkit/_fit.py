@@ -440,7 +440,7 @@ class Fit:
 
 def _fit_table(table: Any, options: tuple[Any, ...]) -> Fit:
     """Fits a table as the file that it would be: one reader, one answer."""
-    inputs = _Inputs((TABLE,), options, csv_of("fit", table))
+    inputs = _Inputs((TABLE,), options, csv_of("fit", table, options[-1]))
     return Fit(inputs.fitted(), inputs)
 
 

@@ -110,7 +110,8 @@ def validate(
         require = f"{100.0 * float(require):.12g}%"
     if require is not None and not isinstance(require, str):
         raise _core.ArgumentError(f'validate: require is {require!r:.60}; expected "10%", 0.1, "20 mN" or "jnd"')
-    options = options_of(reading_of("validate", columns))
+    reading = reading_of("validate", columns)
+    options = options_of(reading)
     for option, value in (("--require", require), ("--placement", placement), ("--instrument", instrument)):
         options += [] if value is None else [option, os.fspath(value)]
     options += ["--new-specimen"] if new_specimen else []
@@ -125,7 +126,7 @@ def validate(
             law = file
         if is_table(recordings):
             file = Path(folder) / "table.csv"
-            file.write_text(csv_of("validate", recordings), encoding="utf-8", newline="")
+            file.write_text(csv_of("validate", recordings, reading), encoding="utf-8", newline="")
             names[str(file)] = TABLE
             recordings = file
         if isinstance(recordings, (Mapping, np.ndarray)):

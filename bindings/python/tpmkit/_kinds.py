@@ -11,8 +11,9 @@ from typing import Any, Callable, Mapping, TypeVar
 
 from . import _core
 
-# What pybind11 and os.fspath() say of an argument of another kind.
-KINDS = ("incompatible function arguments", "incompatible constructor", "expected str, bytes or os.PathLike object")
+# What pybind11, os.fspath() and pathlib say of an argument of another kind.
+KINDS = ("incompatible function arguments", "incompatible constructor", "expected str, bytes or os.PathLike object",
+         "argument should be a str")
 USAGE, BAD_INPUT, ENVIRONMENT = 2, 3, 5  # exit codes of the program, as Error.code
 Function = TypeVar("Function", bound=Callable[..., Any])
 

@@ -25,6 +25,10 @@ def numbers_of(where: str, values: Any) -> Array:
         raise _core.ArgumentError(f"{where} is masked at place {np.flatnonzero(np.ma.getmaskarray(values))[0]}; expected numbers")
     if hasattr(values, "magnitude") or hasattr(values, "unit"):  # of pint, of astropy
         raise _core.ArgumentError(f"{where} is a {type(values).__name__} with a unit of its own; expected plain numbers")
+    if hasattr(values, "isna"):  # of pandas, whose NA is no float
+        missing = np.flatnonzero(np.asarray(values.isna()))
+        if missing.size:
+            raise _core.ArgumentError(f"{where} is NaN at place {missing[0]}; expected numbers")
     try:
         array = np.asarray(values)
     except (TypeError, ValueError):

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import numbers
+import re
 import tempfile
 from collections.abc import Callable, Mapping
 from pathlib import Path
@@ -11,16 +12,18 @@ from typing import TYPE_CHECKING, Any, TypeVar
 import numpy as np
 
 from . import _core
-from ._kinds import shown
+from ._kinds import of_arguments, shown
 from ._law import numbers_of
 
 if TYPE_CHECKING:
     import pandas as pd
+    import xarray
 
 # What `columns` may say: the options of reading of the program, and where a recording comes from.
 KEYS = ("encoding", "separator", "decimal", "thousands", "header_rows", "block", "time", "drive", "response", "sd", "frequency",
         "storage", "loss", "drive_quantity", "response_quantity", "negate_drive", "negate_response", "step_time", "from", "until",
         "rest_length", "area", "spring_constant", "deflection_sensitivity", "segments", "units", "provenance")
+OF_FILES = ("encoding", "separator", "decimal", "thousands", "header_rows")  # how a file is written
 TABLE = "table"  # what messages and answers call a recording in memory
 Answer = TypeVar("Answer")
 
@@ -73,22 +76,57 @@ def is_table(value: Any) -> bool:
     return hasattr(value, "to_csv") or hasattr(value, "to_dataframe")
 
 
-def csv_of(where: str, table: Any) -> str:
+def _is_number(text: str) -> bool:
+    try:
+        float(text)
+    except ValueError:
+        return False
+    return True
+
+
+def _with_titles(where: str, data: xarray.Dataset, units: Mapping[str, str]) -> xarray.Dataset:
+    """The same with the attributes `units` in the names: force with the units "mN" becomes "force (mN)". Raises
+    tpmkit.ArgumentError where a name, or `units` of the call, says another unit."""
+    from ._data import unit_of
+
+    titles = {}
+    for name, variable in data.variables.items():
+        unit = variable.attrs.get("units")
+        if not isinstance(unit, str) or not unit or not isinstance(name, str):
+            continue
+        inside = re.search(r"[(\[]([^()\[\]]*)[)\]]\s*$", name)
+        own = inside[1] if inside else unit_of(name)
+        for said, by in ((units.get(name), "units"), (own, "its name")):
+            if said is not None and said != unit:
+                raise _core.ArgumentError(f"{where}: {name} is in {unit} by its attribute and {by} says {said}; expected the same")
+        if own is None and not name.endswith(f"_{unit}"):
+            titles[name] = f"{name} ({unit})"
+    return data.rename(titles)
+
+
+def csv_of(where: str, table: Any, reading: Mapping[str, Any]) -> str:
     """A DataFrame, or a Dataset over one dimension, as a file of comma-separated values. An index without a name that
-    counts rows is left out, as filtering leaves it behind."""
+    counts rows is left out, as filtering leaves it behind. `reading` is what the call says of its columns."""
     import pandas as pd
 
+    for key in OF_FILES:
+        if key in reading:
+            raise _core.ArgumentError(f"{where}: columns names {key}, which says how a file is written; expected none of "
+                                      f"{', '.join(OF_FILES)} for numbers in memory")
     if hasattr(table, "to_dataframe"):
+        if not hasattr(table, "data_vars"):
+            raise _core.ArgumentError(f"{where}: a {type(table).__name__}; expected a Dataset, or a DataFrame")
         if len(table.dims) != 1:
             raise _core.ArgumentError(f"{where}: a Dataset over {', '.join(map(str, table.dims)) or 'nothing'}; expected one over "
                                       "time_s, as tpmkit.read_recording returns it")
-        table = table.to_dataframe()
+        table = _with_titles(where, table, reading.get("units", {})).to_dataframe()
         if table.index.name == "sample":
             table.index.name = None
     if not isinstance(table, pd.DataFrame):
         raise _core.ArgumentError(f"{where}: a {type(table).__name__}; expected a DataFrame with columns of times, depths and forces")
-    if table.empty:
-        raise _core.ArgumentError(f"{where}: the table has {len(table)} rows and {len(table.columns)} columns; expected times, depths and forces")
+    if table.empty or table.isna().to_numpy().all():
+        raise _core.ArgumentError(f"{where}: the table has {len(table)} rows and {len(table.columns)} columns, and no number; "
+                                  "expected times, depths and forces")
     index = table.index
     if any(name is not None for name in index.names):
         table = table.reset_index()
@@ -96,8 +134,14 @@ def csv_of(where: str, table: Any) -> str:
         raise _core.ArgumentError(f"{where}: the table's index has no name; expected "
                                   'frame.rename_axis("time (s)") to read it, or frame.reset_index(drop=True) to leave it out')
     for name, column in table.items():
+        # A number as a name would be read as the first row.
+        if not isinstance(name, str) or _is_number(name):
+            raise _core.ArgumentError(f"{where}: a column of the table has the name {shown(name)}; expected texts with units, such as "
+                                      '"time (s)", "depth (mm)", "force (mN)"')
         if column.dtype.kind == "m":
             raise _core.ArgumentError(f"{where}: {name} holds {column.dtype}; expected numbers, such as its .dt.total_seconds()")
+        if column.dtype.kind == "c":
+            raise _core.ArgumentError(f"{where}: {name} holds {column.dtype}; expected numbers")
     return table.to_csv(index=False)
 
 
@@ -111,6 +155,9 @@ def frame_of(where: str, arrays: Mapping[str, Any], units: Mapping[str, str] | N
     if not isinstance(units, Mapping) or set(units) != set(arrays):
         raise _core.ArgumentError(f"{where}: units are not guessed; expected units="
                                   '{"time": "s", "depth": "mm", "force": "mN"}, one for each')
+    for name, unit in units.items():
+        if not isinstance(unit, str) or not unit.strip():
+            raise _core.ArgumentError(f'{where}: units has {name!r}: {shown(unit)}; expected a text, such as "mN"')
     columns: dict[str, Any] = {}
     for name, values in arrays.items():
         own = getattr(values, "attrs", {}).get("units")  # of an array of xarray
@@ -129,9 +176,11 @@ def frame_of(where: str, arrays: Mapping[str, Any], units: Mapping[str, str] | N
 
 
 def renamed(value: Any, names: Mapping[str, str]) -> Any:
-    """The same with the names of files that are gone replaced in every text."""
+    """The same with the names of files that are gone replaced in every text; lines of a TABLE are counted as its rows."""
     if isinstance(value, str):
         for old, new in names.items():
+            if new == TABLE:  # rows from 0, below a line of names
+                value = re.sub(re.escape(old) + r":([2-9]|[1-9]\d+)\b", lambda line: f"{TABLE}: row {int(line[1]) - 2}", value)
             value = value.replace(old, new)
         return value
     if isinstance(value, list):
@@ -155,6 +204,9 @@ def by_file(csv: str, work: Callable[[str], Answer]) -> tuple[Answer, dict[str, 
         file.write_text(csv, encoding="utf-8", newline="")
         names = {str(file): TABLE}
         try:
-            return work(str(file)), names
+            return of_arguments(work)(str(file)), names
         except _core.Error as error:
-            raise same_error(error, names) from None
+            refusal = same_error(error, names)
+            said = type(refusal)(re.sub(r'\bunit "([^"]*)=UNIT"', r'units={"\1": UNIT}', str(refusal)))
+            said.code = refusal.code
+            raise said from None
