@@ -473,6 +473,10 @@ def look_at_study(chromium, tpm, folder, picture):
             page.js(f"delete document.body.dataset.ready; document.querySelectorAll('#contents a')[{k - 1}].click()")
             page.ready(f"result {k}")
         assert page.text("badge") == badge, (k, page.text("badge"))
+        if badge == "VALIDATION":  # what is required of each quantity has one name and one colour
+            assert page.js("plots[0].labels.filter(([s]) => s.label === 'requirement').length") == 1
+            assert page.js("new Set(plots[0].series.filter(s => s.label === 'requirement').map(s => s.colour)).size") == 1
+            assert page.text("reading-0").count("requirement") == 1, page.text("reading-0")
         # As the file alone is shown.
         subprocess.run([tpm, "view", told["results"][k - 1]["file"], "-o", folder / "alone.html"], check=True, capture_output=True)
         alone = json.loads(re.search(r'id="description">(.*?)</script>', (folder / "alone.html").read_text()).group(1))
