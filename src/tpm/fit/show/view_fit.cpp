@@ -292,9 +292,24 @@ std::string compared_text(const Json& quantity, const char* key, int digits) {
   return significant(si / unit.to_si, digits) + " " + unit.symbol;
 }
 
+/// @param name of the recording
+Json compared_row(const std::string& name, const Json& quantity) {
+  constexpr int kValueDigits = 4, kErrorDigits = 3;
+  std::string verdict = quantity.at("verdict").get<std::string>();
+  std::ranges::replace(verdict, '_', ' ');
+  const bool share = quantity.at("unit") == "1";
+  return {name,
+          quantity.at("quantity").get<std::string>() + (share ? ", share of S" : ""),
+          verdict,
+          compared_text(quantity, "S", kValueDigits),
+          compared_text(quantity, "D", kValueDigits),
+          compared_text(quantity, "E", kErrorDigits),
+          compared_text(quantity, "U", kErrorDigits),
+          compared_text(quantity, "R", kErrorDigits)};
+}
+
 /// What was compared with the recordings, the conclusion first; the figures beside it.
 void add_validation(ViewPage& page, const Json& json, const std::filesystem::path& file) {
-  constexpr int kValueDigits = 4;
   page.description["kind"] = "validation";
   page.description["badge"] = "VALIDATION";
   page.description["title"] = "Validation of " + json.at("law_file").get<std::string>();
@@ -313,19 +328,16 @@ void add_validation(ViewPage& page, const Json& json, const std::filesystem::pat
             "simulated, measured, E = S - D with its expanded uncertainty U (95 %), and the "
             "largest error that is allowed");
   Json rows = Json::array();
+  // Several recordings are decided by their mean.
+  for (const Json& q : json.value("pooled", Json::array())) {
+    rows.push_back(compared_row(
+        fmt::format("mean of {} recordings", q.at("recordings").get<std::size_t>()), q));
+  }
   for (const Json& recording : json.at("recordings")) {
     const std::string name = recording.at("recording").get<std::string>();
     page.fact("recording",
               fmt::format("{}, SHA-256 {}", name, recording.at("sha256").get<std::string>()));
-    for (const Json& q : recording.at("quantities")) {
-      std::string words = q.at("verdict").get<std::string>();
-      std::ranges::replace(words, '_', ' ');
-      const bool share = q.at("unit") == "1";
-      rows.push_back({name, q.at("quantity").get<std::string>() + (share ? ", share of S" : ""),
-                      words, compared_text(q, "S", kValueDigits),
-                      compared_text(q, "D", kValueDigits), compared_text(q, "E", 3),
-                      compared_text(q, "U", 3), compared_text(q, "R", 3)});
-    }
+    for (const Json& q : recording.at("quantities")) rows.push_back(compared_row(name, q));
   }
   page.description["table"] = {
       {"title", "Compared with the recordings"},
