@@ -447,8 +447,9 @@ def look_at_study(chromium, tpm, folder, picture):
     study = folder / "study"
     for name in ("day/a_fit", "day/b_fit"):
         shutil.copytree(folder / "fitted", study / name)
-    subprocess.run([tpm, "validate", folder / "fitted/law.json", folder / "synthetic.csv", "--folder", study / "checked"],
-                   check=True, capture_output=True)
+    validated = subprocess.run([tpm, "validate", folder / "fitted/law.json", folder / "synthetic.csv", "--require", "50%",
+                                "--folder", study / "checked"], capture_output=True, text=True)
+    assert validated.returncode in (0, 1), validated.stderr  # 1: not adequate, which is shown, too
     shutil.copy(folder / "ball.h5", study)
     (study / "recordings").mkdir()
     for name in ("1.csv", "2.csv"):
