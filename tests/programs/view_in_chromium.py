@@ -283,6 +283,7 @@ def look_at_recording(chromium, tpm, folder):
     # It opens when the hand felt most, the organ with it.
     peak = times[np.argmax(np.abs(force))]
     assert peak > 0.0 and np.isclose(page.js("now"), peak, rtol=0, atol=1e-9), (page.js("now"), peak)
+    assert page.js("D.phases[document.getElementById('phases').selectedIndex].name") in page.text("phase_said")
     state = int(page.js("document.getElementById('scene').dataset.state"))
     states = np.array(page.js("Array.from(organ.times)"))
     assert abs(states[state] - peak) == np.abs(states - peak).min(), (states[state], peak)
