@@ -102,8 +102,7 @@ int view(const ViewChoice& choice, const Session& session) {
   }
   for (std::size_t i = 0; i < viewed.pages.size(); ++i) {
     const bool alone = viewed.pages.size() == 1 && viewed.not_shown.empty();
-    tell_result(viewed.pages[i].description,
-                alone ? "" : viewed.files[i].filename().string() + ": ");
+    tell_result(viewed.pages[i].description, alone ? "" : viewed.names[i] + ": ");
   }
   for (const NotShown& other : viewed.not_shown) say("not shown: {}\n", other.reason.what());
   say("wrote {}: open it in a browser\n", output.string());
@@ -118,8 +117,8 @@ void add_view_command(CLI::App& app, Session& session) {
   auto choice = std::make_shared<ViewChoice>();
   command
       ->add_option("FILE", choice->file,
-                   "HDF5 of tpm simulate, a recording of tpm hil run, law.json, figures.json or "
-                   "the JSON answer of tpm fit; or a folder of them")
+                   "HDF5 of tpm simulate, a recording of tpm hil run, law.json, figures.json, "
+                   "validation.json or the JSON answer of tpm fit; or a folder of them")
       ->required();
   command->add_option(
       "-o,--output", choice->output,

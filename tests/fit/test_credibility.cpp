@@ -41,7 +41,8 @@ TEST_CASE("a credibility page shows its record, and no longer once it was edited
       page,
       Contains("not adequate") && !Contains(">not_adequate<") && Contains("peak force, N") &&
           Contains("empty: nothing was given") && Contains("tpm accuracy verify") &&
-          Contains("data-title=\"u_input\"") &&
+          Contains("data-title=\"u_input\"") && !Contains("<th scope=\"col\"></th>") &&
+          Contains("<th scope=\"col\">in the words of the user</th>") &&
           Contains("compared: ramp from 19.9 s to 20.65 s, 3 mm deep, and hold to 40.7 s: the "
                    "whole loading"));
   // Someone makes the verdict that is shown a better one; the record stays.

@@ -6,6 +6,7 @@
 #include <fstream>
 
 #include "hil_scenes.hpp"
+#include "page_arrays.hpp"
 #include "simulated_scene.hpp"
 #include "temp_folder.hpp"
 #include "tpm/files/file.hpp"
@@ -20,43 +21,10 @@
 using namespace tpm;
 using namespace tpm::haptics;
 using Catch::Matchers::Contains;
+using test::numbers;
 using test::TempFolder;
 
 namespace {
-
-/// Of base64, by its definition (RFC 4648), and not by the library that wrote it.
-std::string decoded(const std::string& text) {
-  static const std::string kDigits =
-      "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
-  std::string bytes;
-  unsigned bits = 0;
-  int held = 0;
-  for (const char c : text) {
-    if (c == '=') break;
-    const std::size_t digit = kDigits.find(c);
-    REQUIRE(digit != std::string::npos);
-    bits = (bits << 6U) | static_cast<unsigned>(digit);
-    held += 6;
-    if (held >= 8) {
-      held -= 8;
-      bytes += static_cast<char>((bits >> static_cast<unsigned>(held)) & 0xFFU);
-    }
-  }
-  return bytes;
-}
-
-/// An array of the page by its name.
-template <class Number>
-std::vector<Number> numbers(const std::string& html, const Json& name) {
-  const std::string begin = "id=\"" + name.get<std::string>() + "\" data-type=\"";
-  const std::size_t at = html.find(begin);
-  REQUIRE(at != std::string::npos);
-  const std::size_t from = html.find('>', at) + 1;
-  const std::string bytes = decoded(html.substr(from, html.find('<', from) - from));
-  std::vector<Number> values(bytes.size() / sizeof(Number));
-  std::memcpy(values.data(), bytes.data(), values.size() * sizeof(Number));
-  return values;
-}
 
 std::string recorded_session(const TempFolder& folder) {
   const HilSession session = test::parsed(test::short_session());
@@ -126,6 +94,72 @@ TEST_CASE("the page of a result opens at the largest response that tpm simulate 
   CHECK(start_s == largest_point(run.record.curve, scene.formulation.tolerance).time_s);
 }
 
+TEST_CASE("the page of a result shows the force of every tool with its name") {
+  const TempFolder folder;
+  constexpr const char* kScene = R"({
+    "organ": {"kind": "block", "cells": [2, 2, 2], "spacing": "10 mm", "lattice": "cubic"},
+    "anchors": [{"kind": "half_space", "point": ["0 mm", "0 mm", "1 mm"], "normal": [0, 0, -1],
+                 "slides": true}, {"kind": "spheres", "spheres": [11, 14]}],
+    "contacts": [
+      {"kind": "punch", "at": ["0 mm", "10 mm", "10 mm"], "direction": [1, 0, 0],
+       "radius": "30 mm"FIRST},
+      {"kind": "punch", "at": ["20 mm", "10 mm", "10 mm"], "direction": [-1, 0, 0],
+       "radius": "30 mm"SECOND}], "outputs": {"count": 4}BESIDE})";
+  const std::string motion =
+      R"(, "protocol": {"kind": "ramp_hold", "depth": "1 mm", "rate": "1 mm/s", "hold": "1 s"})";
+  const auto viewed = [&](const std::string& first, const std::string& second,
+                          const std::string& beside) {
+    std::string text = kScene;
+    for (const auto& [place, words] :
+         {std::pair{"FIRST", first}, {"SECOND", second}, {"BESIDE", beside}}) {
+      text.replace(text.find(place), std::strlen(place), words);
+    }
+    const ExperimentScene scene = test::experiment(text);
+    const RunNetwork network = network_to_run(scene);
+    const std::string file = folder / "r.h5";
+    write_simulation(scene, network, simulate(scene, network), file);
+    return view_file(file);
+  };
+  const auto labels = [](const Json& plot) {
+    std::vector<std::string> list;
+    for (const Json& series : plot.at("series")) list.push_back(series.at("label"));
+    return list;
+  };
+  const std::vector<std::string> kBoth{"contact 1: punch", "contact 2: punch"};
+  // A protocol of its own: a curve of its own, also of the depth.
+  const ViewPage own = viewed(motion, R"(, "protocol": {"kind": "ramp_hold", "depth": "0.5 mm",
+      "rate": "1 mm/s", "hold": "1.5 s"})",
+                              "");
+  const Json& plots = own.description.at("plots");
+  CHECK(plots.at(0).at("title") == "depth");
+  CHECK(labels(plots.at(0)) == kBoth);
+  CHECK(plots.at(1).at("title") == "contact force");
+  CHECK(labels(plots.at(1)) == kBoth);
+  CHECK(own.description.at("organ").at("tools").at("names") == Json(kBoth));
+  const Hdf5Reader file(folder / "r.h5");
+  CHECK(numbers<double>(own.html(), plots.at(1).at("series").at(1).at("y")) ==
+        file.numbers("/contacts/2/force_N"));
+  // The energy is that of the tissue.
+  CHECK(labels(plots.at(2)) == std::vector<std::string>{"dissipated energy"});
+  // One protocol for both: the force of each at the states of the file.
+  const ViewPage both = viewed("", "", motion);
+  const Json& force = both.description.at("plots").at(1);
+  CHECK(labels(force) ==
+        std::vector<std::string>{"contact 1: punch + contact 2: punch", kBoth[0], kBoth[1]});
+  const std::string html = both.html();
+  const auto first = numbers<double>(html, force.at("series").at(1).at("y"));
+  const auto second = numbers<double>(html, force.at("series").at(2).at("y"));
+  const Hdf5Reader again(folder / "r.h5");
+  REQUIRE(first.size() == again.numbers("/steps/time_s").size());
+  REQUIRE(second.size() == first.size());
+  const std::string last = "/steps/0000" + std::to_string(first.size() - 1);
+  const std::vector<double> held = again.table(last + "/tools/force_on_tissue_N");
+  CHECK(first.back() == held[0]);
+  CHECK(second.back() == -held[3]);
+  CHECK(first.back() > 0.0);
+  CHECK(second.back() > 0.0);
+}
+
 TEST_CASE("the page of a result on a smooth table says what slides in its plane") {
   const TempFolder folder;
   const ExperimentScene scene = test::experiment(R"({
@@ -157,6 +191,13 @@ TEST_CASE("the page of a recording holds every sample, or the extremes of parts"
   CHECK(page.description.at("badge") == "SIMULATED DEVICE");
   CHECK(page.description.at("samples") == depth_mm.size());
   CHECK(page.description.at("organ").at("spheres") == 4);
+  // It opens when the hand felt most.
+  const ServoRecord& peak =
+      *std::ranges::max_element(recording.rows, {}, [&](const ServoRecord& r) {
+        return r.phase >= 0 ? std::abs(recording.commanded_N(r)) : -1.0;
+      });
+  REQUIRE(std::abs(recording.commanded_N(peak)) > 0.0);
+  CHECK(page.description.at("start_s") == recording.time_s(peak));
   const Json& whole = page.description.at("plots").at(0).at("series").at(0);
   CHECK(numbers<float>(page.html(), whole.at("y")) == depth_mm);
 
@@ -300,85 +341,6 @@ TEST_CASE("the page of a fit says first whether the law describes the data, and 
   CHECK_THROWS_WITH(view_path(empty.path()),
                     Contains("is a folder without a result that tpm view shows; expected a result "
                              "of tpm simulate"));
-}
-
-namespace {
-
-/// A file that the reader of sweeps takes for one of theirs.
-void write_sweep_like(const std::string& file) {
-  Hdf5Writer sweep(file);
-  sweep.numbers("/peak_force", {1.0, 2.0});
-  sweep.attribute("/", "sweep_fingerprint", "a");
-  sweep.commit();
-}
-
-const std::string kLawAlone = R"({"law": "linear-1", "drive": "indentation_depth",
-    "response": "contact_force", "reference_m": 0.004, "provenance": "derived",
-    "parameters": {"k_inf_N_per_m": 60, "k1_N_per_m": 45, "tau1_s": 2, "contact_m": 0,
-                   "offset_N": 0}})";
-
-std::vector<std::string> names_of(const Viewed& viewed) {
-  std::vector<std::string> names;
-  for (const auto& file : viewed.files) names.push_back(file.filename().string());
-  return names;
-}
-
-}  // namespace
-
-TEST_CASE("a folder is viewed by what its files hold, whatever their names are") {
-  const TempFolder folder;
-  const ExperimentScene scene = test::small_scene(
-      R"("protocol": {"kind": "ramp_hold", "depth": "4 mm", "rate": "4 mm/s", "hold": "1 s"},
-         "outputs": {"count": 2})");
-  const RunNetwork network = network_to_run(scene);
-  write_simulation(scene, network, simulate(scene, network), folder / "poke");
-  // One result alone is its own page.
-  std::ofstream(folder / "notes.txt") << "depth [mm],force [N]\n";
-  const Viewed alone = view_path(folder.path());
-  CHECK(names_of(alone) == std::vector<std::string>{"poke"});
-  CHECK(alone.html() == view_file(folder / "poke").html());
-
-  std::ofstream(folder / "liver.json") << kLawAlone;
-  write_sweep_like(folder / "mysweep.h5");
-  std::ofstream(folder / "scene.json") << R"({"organ": {"kind": "star"}})";
-  std::ofstream(folder / "cut.json") << R"({"figures": [)";
-  const Viewed several = view_path(folder.path());
-  CHECK(names_of(several) == std::vector<std::string>{"liver.json", "poke"});
-  REQUIRE(several.not_shown.size() == 2);
-  CHECK_THAT(several.not_shown[0].reason.what(), Contains("cut.json: parse error"));
-  CHECK_THAT(several.not_shown[1].reason.what(),
-             Contains("mysweep.h5: is the result of a sweep; expected tpm sweep plot " +
-                      (folder / "mysweep.h5")));
-  // Both stand on the page, each with its arrays under its own names.
-  const std::string html = several.html();
-  CHECK_THAT(html, Contains(R"("names":["liver.json","poke"])") && Contains("tpm sweep plot") &&
-                       Contains("id=\"result-1-description\"") &&
-                       Contains("id=\"result-2-description\""));
-  const Json& organ = several.pages.at(1).description.at("organ");
-  const std::string time = "result-2-" + organ.at("time_s").get<std::string>();
-  CHECK(numbers<double>(html, time) ==
-        numbers<double>(several.pages.at(1).html(), organ.at("time_s")));
-}
-
-TEST_CASE("a folder whose results tpm view does not show is refused with what shows them") {
-  const TempFolder folder;
-  write_sweep_like(folder / "b.h5");
-  const std::string words = "is the result of a sweep; expected tpm sweep plot ";
-  CHECK_THROWS_WITH(view_file(folder / "b.h5"), Contains(words + (folder / "b.h5")));
-  CHECK_THROWS_WITH(view_path(folder.path()), Contains(words + (folder / "b.h5")));
-  write_sweep_like(folder / "a.h5");
-  CHECK_THROWS_WITH(view_path(folder.path()),
-                    Contains("2 files that tpm view does not show, the first: ") &&
-                        Contains(words + (folder / "a.h5")));
-}
-
-TEST_CASE("a folder with more results than a page holds is refused") {
-  const TempFolder folder;
-  for (std::size_t i = 0; i <= kMostResultsOfPage; ++i) {
-    std::ofstream(folder / ("law" + std::to_string(i) + ".json")) << kLawAlone;
-  }
-  CHECK_THROWS_WITH(view_path(folder.path()),
-                    Contains("holds 51 results; expected 50 at most on one page"));
 }
 
 TEST_CASE("the page of a fit says which intervals it has, and no level that nobody stated") {

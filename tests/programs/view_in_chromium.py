@@ -209,6 +209,42 @@ def look_at_tool(chromium, tpm, folder, picture):
     page.check_whole()
 
 
+def look_at_grasp(chromium, tpm, folder, picture):
+    """Two plates: the force and the depth of each stand in the plots by name, and no name covers another."""
+    plate = {"kind": "punch", "radius": "30 mm"}
+    grasp = {"title": "grasped", "organ": {"kind": "block", "cells": [2, 2, 2], "spacing": "10 mm", "lattice": "cubic"},
+             "material": {"E1": "12 kPa", "E2": "12 kPa", "Eprime": "12 kPa", "eta1": "48 kPa s"},
+             "anchors": [{"kind": "half_space", "point": ["0 mm", "0 mm", "1 mm"], "normal": [0, 0, -1], "slides": True},
+                         {"kind": "spheres", "spheres": [11, 14]}],
+             "contacts": [{**plate, "at": [f"{x} mm", "10 mm", "10 mm"], "direction": [push, 0, 0],
+                           "protocol": {"kind": "ramp_hold", "depth": depth, "rate": "1 mm/s", "hold": "1 s"}}
+                          for x, push, depth in ((0, 1, "1 mm"), (20, -1, "0.5 mm"))], "outputs": {"count": 9}}
+    (folder / "grasp.json").write_text(json.dumps(grasp))
+    result = folder / "grasp.h5"
+    subprocess.run([tpm, "simulate", folder / "grasp.json", "-o", result], check=True, capture_output=True)
+    subprocess.run([tpm, "view", result, "-o", folder / "grasp.html"], check=True, capture_output=True)
+    page = Page(chromium, folder / "grasp.html")
+    names = ["contact 1: punch", "contact 2: punch"]
+    with h5py.File(result) as file:
+        want = {"depth": [1e3 * file[f"{group}/depth_m"][:] for group in ("curve", "contacts/2")],
+                "contact force": [file[f"{group}/force_N"][:] for group in ("curve", "contacts/2")]}
+    for quantity, curves in want.items():
+        plot = f"plots.find(p => p.d.title === '{quantity}')"
+        assert page.js(f"{plot}.series.map(s => s.label)") == names, page.js(f"{plot}.series.map(s => s.label)")
+        for k, curve in enumerate(curves):
+            np.testing.assert_allclose(page.js(f"Array.from({plot}.series[{k}].y)"), curve, rtol=1e-12)
+    assert page.js("plots.find(p => p.d.title === 'dissipated energy').series.length") == 1
+    for width in (400, 1400):
+        chromium.call("Emulation.setDeviceMetricsOverride", width=width, height=900, deviceScaleFactor=1, mobile=False)
+        page.frame()
+        drawn = json.loads(page.js("document.getElementById('scene').dataset.names"))
+        (a, y, w), (b, z, v) = drawn
+        assert abs(y - z) >= 16 or a + w <= b or b + v <= a, drawn
+        if picture:
+            chromium.picture(picture.replace(".png", f"_grasp_{width}.png"))
+    page.check_whole()
+
+
 def check_cursor(page, result):
     """The curve of the force, read by key and mouse."""
     with h5py.File(result) as file:
@@ -239,13 +275,18 @@ def look_at_recording(chromium, tpm, folder):
     subprocess.run([tpm, "hil", "export", recording, "-o", rows], check=True, capture_output=True)
     recording.unlink()
     with h5py.File(rows) as file:
-        force = -file["rows/commanded_N"][:] if "rows/commanded_N" in file else None
-        names = list(file["rows"])
+        force = file["rows/commanded_N"][:]
         depth = file["rows/tool_depth_m"][:]
         times = file["rows/time_s"][:]
-    assert force is None or len(force), names
     page = Page(chromium, folder / "s.html")
     assert page.text("badge") == "SIMULATED DEVICE", page.text("badge")
+    # It opens when the hand felt most, the organ with it.
+    peak = times[np.argmax(np.abs(force))]
+    assert peak > 0.0 and np.isclose(page.js("now"), peak, rtol=0, atol=1e-9), (page.js("now"), peak)
+    assert page.js("D.phases[document.getElementById('phases').selectedIndex].name") in page.text("phase_said")
+    state = int(page.js("document.getElementById('scene').dataset.state"))
+    states = np.array(page.js("Array.from(organ.times)"))
+    assert abs(states[state] - peak) == np.abs(states - peak).min(), (states[state], peak)
     pictures = set()
     start = time.monotonic()
     for part in np.linspace(0.0, 1.0, 9):
@@ -401,6 +442,56 @@ def look_at_folder(chromium, tpm, folder):
     page.check_whole()
 
 
+def look_at_study(chromium, tpm, folder, picture):
+    """A folder of folders of fits, a validation, a simulation, a session and recordings: each is listed under its kind and
+    shown as alone; recordings are named with the command that fits them."""
+    study = folder / "study"
+    for name in ("day/a_fit", "day/b_fit"):
+        shutil.copytree(folder / "fitted", study / name)
+    validated = subprocess.run([tpm, "validate", folder / "fitted/law.json", folder / "synthetic.csv", "--require", "50%",
+                                "--folder", study / "checked"], capture_output=True, text=True)
+    assert validated.returncode in (0, 1), validated.stderr  # 1: not adequate, which is shown, too
+    shutil.copy(folder / "ball.h5", study)
+    (study / "recordings").mkdir()
+    for name in ("1.csv", "2.csv"):
+        shutil.copy(folder / "synthetic.csv", study / "recordings" / name)
+    press = {"depths": ["2 mm"], "rates": ["4 mm/s"], "hold": "1 s", "rest": "1 s"}
+    (folder / "press.json").write_text(json.dumps({**SESSION, "title": "one press", "indentations": press}))
+    subprocess.run([tpm, "hil", "run", folder / "press.json", "--clock", "virtual", "-o", study / "press.tpmrec"], check=True,
+                   capture_output=True)
+    view = [tpm, "view", study, "-o", folder / "study.html"]
+    told = json.loads(subprocess.run([*view, "--format", "json"], check=True, capture_output=True).stdout)
+    assert [r["kind"] for r in told["results"]] == ["fit", "fit", "validation", "simulation", "recording"], told
+    words = f"{study / 'recordings'}: holds 2 tables, no result of tpm; expected tpm fit {study / 'recordings'}, if they are recordings"
+    assert [one["message"] for one in told["not_shown"]] == [words], told
+    page = Page(chromium, folder / "study.html")
+    assert page.js("[...document.querySelectorAll('#contents h2')].map(h => h.textContent)") == \
+        ["Fits", "Validations", "Simulations", "Sessions", "Not shown"]
+    assert page.js("[...document.querySelectorAll('#contents a')].map(a => a.textContent)") == \
+        ["day/a_fit", "day/b_fit", "checked", "ball.h5", "press.tpmrec"]
+    assert words in page.text("contents"), page.text("contents")
+    for k, badge in enumerate(("FIT", "FIT", "VALIDATION", "SIMULATED", "SIMULATED DEVICE"), 1):
+        if k > 1:
+            page.js(f"delete document.body.dataset.ready; document.querySelectorAll('#contents a')[{k - 1}].click()")
+            page.ready(f"result {k}")
+        assert page.text("badge") == badge, (k, page.text("badge"))
+        if badge == "VALIDATION":  # what is required of each quantity has one name and one colour
+            assert page.js("plots[0].labels.filter(([s]) => s.label === 'requirement').length") == 1
+            assert page.js("new Set(plots[0].series.filter(s => s.label === 'requirement').map(s => s.colour)).size") == 1
+            assert page.text("reading-0").count("requirement") == 1, page.text("reading-0")
+        # As the file alone is shown.
+        subprocess.run([tpm, "view", told["results"][k - 1]["file"], "-o", folder / "alone.html"], check=True, capture_output=True)
+        alone = json.loads(re.search(r'id="description">(.*?)</script>', (folder / "alone.html").read_text()).group(1))
+        assert json.loads(page.js("JSON.stringify(D)")) == alone, badge
+        assert page.js("plots.length") == len(alone["plots"]) > 0, badge
+        assert page.js("[...document.querySelectorAll('th')].every(h => h.textContent !== '')"), badge
+        for width in (400, 1400) if picture else ():
+            chromium.call("Emulation.setDeviceMetricsOverride", width=width, height=900, deviceScaleFactor=1, mobile=False)
+            page.frame()
+            chromium.picture(picture.replace(".png", f"_study_{k}_{width}.png"))
+        page.check_whole()
+
+
 def main():
     program = shutil.which("chromium") or shutil.which("chromium-browser") or shutil.which("google-chrome")
     if not program:
@@ -416,14 +507,16 @@ def main():
         try:
             look_at_result(chromium, sys.argv[1], folder, sys.argv[2] if len(sys.argv) > 2 else None)
             look_at_tool(chromium, sys.argv[1], folder, sys.argv[2] if len(sys.argv) > 2 else None)
+            look_at_grasp(chromium, sys.argv[1], folder, sys.argv[2] if len(sys.argv) > 2 else None)
             look_at_recording(chromium, sys.argv[1], folder)
             look_at_fit(chromium, sys.argv[1], folder)
             look_at_names(chromium, sys.argv[1], folder)
             look_at_lines(chromium, sys.argv[1], folder)
             look_at_folder(chromium, sys.argv[1], folder)
+            look_at_study(chromium, sys.argv[1], folder, sys.argv[2] if len(sys.argv) > 2 else None)
         finally:
             chromium.close()
-    print("looked at a result, a recording, three files of a fit and a folder")
+    print("looked at a result, a grasp, a recording, three files of a fit, a folder and a study")
 
 
 if __name__ == "__main__":

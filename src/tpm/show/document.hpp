@@ -38,7 +38,7 @@ struct Bullets {
 
 struct Table {
   std::string caption;
-  std::vector<Column> columns;
+  std::vector<Column> columns;            ///< all without a title: HTML has no head row
   std::vector<std::vector<Cell>> rows{};  ///< each as long as `columns`
   /// In HTML on a narrow screen each row becomes a list of titles and values, in place of a table
   /// that must be scrolled.

@@ -178,12 +178,17 @@ struct HtmlBlock {
     if (!table.caption.empty()) {
       out += fmt::format("<caption>{}</caption>\n", html_escaped(table.caption));
     }
-    out += "<thead><tr>";
-    for (const Column& column : table.columns) {
-      out += fmt::format("<th scope=\"col\"{}>{}</th>",
-                         class_attribute(column.numeric, Tone::plain), html_escaped(column.title));
+    const auto titled = [](const Column& column) { return !column.title.empty(); };
+    if (std::ranges::any_of(table.columns, titled)) {
+      out += "<thead><tr>";
+      for (const Column& column : table.columns) {
+        out +=
+            fmt::format("<th scope=\"col\"{}>{}</th>", class_attribute(column.numeric, Tone::plain),
+                        html_escaped(column.title));
+      }
+      out += "</tr></thead>\n";
     }
-    out += "</tr></thead>\n<tbody>\n";
+    out += "<tbody>\n";
     for (const auto& row : table.rows) {
       out += "<tr>";
       for (std::size_t i = 0; i < row.size(); ++i) {

@@ -113,7 +113,15 @@ std::string ViewPage::html() const {
 
 std::string html_of(const std::vector<ViewPage>& results, const std::vector<std::string>& names,
                     const std::vector<std::string>& not_shown) {
-  std::string text = json_element("results", {{"names", names}, {"not_shown", not_shown}});
+  Json kinds = Json::array(), titles = Json::array();
+  for (const ViewPage& page : results) {
+    kinds.push_back(page.description.at("kind"));
+    titles.push_back(page.description.at("title"));
+  }
+  std::string text = json_element("results", {{"names", names},
+                                              {"kinds", std::move(kinds)},
+                                              {"titles", std::move(titles)},
+                                              {"not_shown", not_shown}});
   for (std::size_t i = 0; i < results.size(); ++i) {
     text += results[i].elements(fmt::format("result-{}-", i + 1));
   }

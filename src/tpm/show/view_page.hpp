@@ -48,7 +48,7 @@ class ViewPage {
   std::vector<Array> arrays_;
 };
 
-/// Results as one page that shows one of them at a time and lists all at its top.
+/// Results as one page that shows one of them at a time and lists all by their kind at its top.
 /// @param names of the results, as they are listed
 /// @param not_shown what else was found, in words
 [[nodiscard]] std::string html_of(const std::vector<ViewPage>& results,

@@ -48,8 +48,8 @@ class EvidencePage {
     if (!changes.empty()) add_changes(d, changes);
     const Json& summary = record_.at("summary");
     d.heading(2, "Question, context and risk");
-    d.table({"in the words of the user",
-             {{"", false}, {"", false}},
+    d.table({"",
+             {{"item"}, {"in the words of the user"}},
              {{{"question of interest"}, {stated(summary, "question")}},
               {{"context of use"}, {stated(summary, "context")}},
               {{"model risk"}, {stated(summary, "risk")}}}});

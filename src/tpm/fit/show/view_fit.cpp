@@ -282,12 +282,83 @@ void add_conclusion(ViewPage& page, const Json& answer, const Json& fit) {
   }
 }
 
+/// "0.273817 N"; "-" where nothing was required.
+std::string compared_text(const Json& quantity, const char* key, int digits) {
+  if (!quantity.contains(key) || !quantity.at(key).is_number()) return "-";
+  const double si = quantity.at(key).get<double>();
+  const std::string symbol = quantity.at("unit").get<std::string>();
+  if (symbol.empty() || symbol == "1") return significant(si, digits);
+  const Unit unit = read_unit(symbol, si);
+  return significant(si / unit.to_si, digits) + " " + unit.symbol;
+}
+
+/// @param name of the recording
+Json compared_row(const std::string& name, const Json& quantity) {
+  constexpr int kValueDigits = 4, kErrorDigits = 3;
+  std::string verdict = quantity.at("verdict").get<std::string>();
+  std::ranges::replace(verdict, '_', ' ');
+  const bool share = quantity.at("unit") == "1";
+  return {name,
+          quantity.at("quantity").get<std::string>() + (share ? ", share of S" : ""),
+          verdict,
+          compared_text(quantity, "S", kValueDigits),
+          compared_text(quantity, "D", kValueDigits),
+          compared_text(quantity, "E", kErrorDigits),
+          compared_text(quantity, "U", kErrorDigits),
+          compared_text(quantity, "R", kErrorDigits)};
+}
+
+/// What was compared with the recordings, the conclusion first; the figures beside it.
+void add_validation(ViewPage& page, const Json& json, const std::filesystem::path& file) {
+  page.description["kind"] = "validation";
+  page.description["badge"] = "VALIDATION";
+  page.description["title"] = "Validation of " + json.at("law_file").get<std::string>();
+  const std::string verdict = json.at("verdict").get<std::string>();
+  const bool doubt = verdict != "adequate" && json.at("requirement") != "none";
+  Json& lead = page.description["lead"] =
+      Json::array({{{"text", json.at("summary")}, {"doubt", doubt}}});
+  for (const Json& remark : json.at("remarks")) {
+    lead.push_back(
+        {{"text", "warning: " + remark.at("text").get<std::string>()}, {"doubt", false}});
+  }
+  page.fact("law", fmt::format("{}, SHA-256 {}", json.at("law").get<std::string>(),
+                               json.at("law_sha256").get<std::string>()));
+  page.fact("requirement", json.at("requirement").get<std::string>());
+  page.fact("S, D, E, U, R",
+            "simulated, measured, E = S - D with its expanded uncertainty U (95 %), and the "
+            "largest error that is allowed");
+  Json rows = Json::array();
+  // Several recordings are decided by their mean.
+  for (const Json& q : json.value("pooled", Json::array())) {
+    rows.push_back(compared_row(
+        fmt::format("mean of {} recordings", q.at("recordings").get<std::size_t>()), q));
+  }
+  for (const Json& recording : json.at("recordings")) {
+    const std::string name = recording.at("recording").get<std::string>();
+    page.fact("recording",
+              fmt::format("{}, SHA-256 {}", name, recording.at("sha256").get<std::string>()));
+    for (const Json& q : recording.at("quantities")) rows.push_back(compared_row(name, q));
+  }
+  page.description["table"] = {
+      {"title", "Compared with the recordings"},
+      {"head", {"recording", "quantity", "verdict", "S", "D", "E", "U", "R"}},
+      {"rows", std::move(rows)}};
+  const std::filesystem::path figures = file.parent_path() / "figures.json";
+  if (is_validation_of_folder(file) && std::filesystem::exists(figures)) {
+    add_figures(page, read_json(figures), figures.string());
+  }
+}
+
 bool is_law(const Json& json) {
   return json.contains("law") && json.contains("parameters") && json.contains("response");
 }
 
 bool is_answer(const Json& json) {
   return json.contains("parameters") && json.contains("model") && json.contains("chi_square");
+}
+
+bool is_validation(const Json& json) {
+  return json.contains("law_file") && json.contains("recordings") && json.contains("verdict");
 }
 
 const Json& fit_in(const Json& answer) {
@@ -328,6 +399,8 @@ void add_fit(ViewPage& page, const Json& json, FitFile is, const std::filesystem
       add_figures(page, json, file.string());
     } else if (is == FitFile::law) {
       add_law_and_figures(page, file);
+    } else if (is == FitFile::validation) {
+      add_validation(page, json, file);
     } else {
       add_conclusion(page, json, fit);
       const std::filesystem::path figures = file.parent_path() / "figures.json";
@@ -348,11 +421,16 @@ FitFile fit_file(const Json& document) {
   if (!document.is_object()) return FitFile::none;
   if (document.contains("figures")) return FitFile::figures;
   if (is_law(document)) return FitFile::law;
+  if (is_validation(document)) return FitFile::validation;
   return is_answer(fit_in(document)) ? FitFile::answer : FitFile::none;
 }
 
 bool is_answer_of_folder(const std::filesystem::path& file) {
   return file.filename() == "selection.json" || file.filename() == "answer.json";
+}
+
+bool is_validation_of_folder(const std::filesystem::path& file) {
+  return file.filename() == "validation.json";
 }
 
 ViewPage fit_page(const Json& answer, const Json& figures, const std::filesystem::path& file) {
@@ -372,7 +450,7 @@ ViewPage view_fit(const std::filesystem::path& file, std::string_view bytes) {
   const FitFile is = fit_file(json);
   if (is == FitFile::none) {
     throw bad_input(file.string(), "is JSON that tpm view does not show",
-                    "law.json, figures.json or the JSON answer of tpm fit");
+                    "law.json, figures.json, validation.json or the JSON answer of tpm fit");
   }
   add_fit(page, json, is, file);
   return page;

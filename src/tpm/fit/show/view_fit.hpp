@@ -8,16 +8,19 @@
 
 namespace tpm::fit {
 
-/// The kind of a JSON document that a fit has written.
-enum class FitFile { none, answer, law, figures };
+/// The kind of a JSON document that a fit or a validation has written.
+enum class FitFile { none, answer, law, figures, validation };
 [[nodiscard]] FitFile fit_file(const Json& document);
 
 /// The answer of a fit in a folder of results ("selection.json", "answer.json"), whose page shows
 /// figures.json beside it.
 [[nodiscard]] bool is_answer_of_folder(const std::filesystem::path& file);
 
-/// The page of law.json, figures.json or the JSON answer of `tpm fit`. Throws Error(bad_input) for
-/// another document.
+/// The validation in a folder of results, whose page shows figures.json beside it.
+[[nodiscard]] bool is_validation_of_folder(const std::filesystem::path& file);
+
+/// The page of law.json, figures.json, validation.json or the JSON answer of `tpm fit`. Throws
+/// Error(bad_input) for another document.
 /// @param bytes of the file, for its text and its hash
 [[nodiscard]] ViewPage view_fit(const std::filesystem::path& file, std::string_view bytes);
 

@@ -7,8 +7,10 @@
 #include <tuple>
 
 #include "tpm/base/lists.hpp"
+#include "tpm/base/text.hpp"
 #include "tpm/files/file.hpp"
 #include "tpm/files/hdf5/hdf5.hpp"
+#include "tpm/files/other_kind.hpp"
 #include "tpm/fit/show/view_fit.hpp"
 #include "tpm/haptics/show/view_recording.hpp"
 #include "tpm/plan/show/view_simulation.hpp"
@@ -18,8 +20,8 @@ namespace fs = std::filesystem;
 namespace {
 
 constexpr const char* kShownFiles =
-    "a result of tpm simulate (HDF5), a recording of tpm hil run, or law.json, figures.json or "
-    "the JSON answer of tpm fit";
+    "a result of tpm simulate (HDF5), a recording of tpm hil run, law.json, figures.json, "
+    "validation.json or the JSON answer of tpm fit";
 
 /// Kind of a file by its first bytes.
 enum class FirstBytes { json, hdf5, rows, other };
@@ -34,21 +36,38 @@ FirstBytes first_bytes(std::string_view bytes) {
 
 /// Without telling anyone that the file was read: most files of a folder are nothing to view, and
 /// one of them may be the page that is written.
-FirstBytes first_bytes_of(const fs::path& file) {
-  constexpr std::size_t kLooked = 64;
+std::string beginning_of(const fs::path& file) {
+  constexpr std::size_t kLooked = 512;
   std::string bytes(kLooked, '\0');
   std::ifstream in(file, std::ios::binary);
   in.read(bytes.data(), kLooked);
   bytes.resize(static_cast<std::size_t>(in.gcount()));
-  return first_bytes(bytes);
+  return bytes;
+}
+
+/// True of bytes that may be a recording: a table, whatever its columns are.
+bool is_table(std::string_view bytes) {
+  const auto called = kind_without_json(bytes);
+  return called && *called == "a table of samples";
+}
+
+/// @param path a table, or a folder of several
+Error no_result(const fs::path& path, std::size_t tables) {
+  const bool one = tables == 1;
+  return bad_input(path.string(),
+                   one ? "is a table, no result of tpm"
+                       : fmt::format("holds {} tables, no result of tpm", tables),
+                   fmt::format("tpm fit {}, if {}", shell_word(path.string()),
+                               one ? "it is a recording" : "they are recordings"));
 }
 
 /// The order on the page.
-enum class ResultKind { answer, law, figures, simulation, recording, none };
+enum class ResultKind { answer, law, validation, figures, simulation, recording, none };
 
 /// Throws Error(bad_input) for what tpm view does not show.
 ResultKind result_kind(const fs::path& file) {
-  switch (first_bytes_of(file)) {
+  const std::string beginning = beginning_of(file);
+  switch (first_bytes(beginning)) {
     case FirstBytes::rows:
       return ResultKind::recording;
     case FirstBytes::hdf5:
@@ -62,6 +81,8 @@ ResultKind result_kind(const fs::path& file) {
           return ResultKind::answer;
         case fit::FitFile::law:
           return ResultKind::law;
+        case fit::FitFile::validation:
+          return ResultKind::validation;
         case fit::FitFile::figures:
           return ResultKind::figures;
         case fit::FitFile::none:
@@ -69,6 +90,10 @@ ResultKind result_kind(const fs::path& file) {
       }
       break;
     case FirstBytes::other:
+      if (beginning.find("<title>Credibility of ") != std::string::npos) {
+        throw bad_input(file.string(), "is the credibility page of a validation",
+                        "a browser; tpm validate --recheck computes it again");
+      }
       break;
   }
   return ResultKind::none;
@@ -79,52 +104,118 @@ struct FoundResult {
   fs::path file;
 };
 
-/// True of what stands on the page of another result: figures.json on that of a law or an answer,
-/// law.json on that of the answer that tpm fit wrote beside it.
+/// True of what stands on the page of another result of its folder: figures.json on that of a law,
+/// an answer or a validation, law.json on that of the answer that tpm fit wrote beside it.
 bool is_part_of(const FoundResult& part, const FoundResult& whole) {
+  if (part.file.parent_path() != whole.file.parent_path()) return false;
   const bool answer = whole.kind == ResultKind::answer && fit::is_answer_of_folder(whole.file);
   const fs::path name = part.file.filename();
-  if (name == "figures.json") return answer || whole.kind == ResultKind::law;
+  if (name == "figures.json") {
+    return answer || whole.kind == ResultKind::law ||
+           (whole.kind == ResultKind::validation && fit::is_validation_of_folder(whole.file));
+  }
   return part.kind == ResultKind::law && name == "law.json" && answer;
+}
+
+/// Its files, and those of the folders in it: of a specimen, a day, a fit.
+std::vector<fs::path> files_below(const fs::path& folder) {
+  std::vector<fs::path> files;
+  const auto options = fs::directory_options::skip_permission_denied;
+  for (auto entry = fs::recursive_directory_iterator(folder, options);
+       entry != fs::recursive_directory_iterator(); ++entry) {
+    if (entry->is_directory()) {
+      const bool hidden = entry->path().filename().string().starts_with('.');
+      if (hidden || entry.depth() >= kFoldersBelow) entry.disable_recursion_pending();
+    } else if (entry->is_regular_file()) {
+      files.push_back(entry->path());
+    }
+  }
+  std::ranges::sort(files);
+  return files;
+}
+
+/// True of a table that a result was written with: any beside JSON of tpm, the one that is called
+/// like its HDF5.
+bool is_table_of(const fs::path& table, const FoundResult& result) {
+  if (table.parent_path() != result.file.parent_path()) return false;
+  return result.file.extension() == ".json" || table.stem() == result.file.stem();
+}
+
+/// Tables that may be recordings: by their folder if it has several.
+std::vector<NotShown> not_shown_tables(std::vector<fs::path> tables) {
+  std::ranges::stable_sort(tables, {}, &fs::path::parent_path);
+  std::vector<NotShown> list;
+  for (std::size_t begin = 0, end = 0; begin < tables.size(); begin = end) {
+    const fs::path folder = tables[begin].parent_path();
+    end = begin;
+    while (end < tables.size() && tables[end].parent_path() == folder) ++end;
+    const std::size_t count = end - begin;
+    const fs::path& named = count == 1 ? tables[begin] : folder;
+    list.push_back({named, no_result(named, count)});
+  }
+  return list;
+}
+
+/// The folder of a fit is its name; other results are named with their folders.
+std::vector<std::string> names_within(const fs::path& folder, const std::vector<fs::path>& files) {
+  return mapped<std::string>(files, [&](const fs::path& file) {
+    const fs::path parent = file.parent_path();
+    const auto beside = [&](const fs::path& other) { return other.parent_path() == parent; };
+    const bool alone = file.extension() == ".json" && std::ranges::count_if(files, beside) == 1;
+    const fs::path name = file.lexically_relative(folder);
+    return (alone && name.has_parent_path() ? name.parent_path() : name).generic_string();
+  });
 }
 
 }  // namespace
 
 FolderResults results_in(const fs::path& folder) {
   std::vector<FoundResult> found;
+  std::vector<fs::path> tables;
   FolderResults results;
-  for (const auto& entry : fs::directory_iterator(folder)) {
-    if (!entry.is_regular_file()) continue;
+  for (const fs::path& file : files_below(folder)) {
     try {
-      const ResultKind kind = result_kind(entry.path());
-      if (kind != ResultKind::none) found.push_back({kind, entry.path()});
+      const ResultKind kind = result_kind(file);
+      const bool table = file.extension() == ".csv" || file.extension() == ".tsv";
+      if (kind != ResultKind::none) {
+        found.push_back({kind, file});
+      } else if (table && is_table(beginning_of(file))) {
+        tables.push_back(file);
+      }
     } catch (const Error& error) {
       if (error.code() != ExitCode::bad_input) throw;
-      results.not_shown.push_back({entry.path(), error});
+      results.not_shown.push_back({file, error});
     }
   }
   std::ranges::sort(found, [](const FoundResult& a, const FoundResult& b) {
     return std::tie(a.kind, a.file) < std::tie(b.kind, b.file);
   });
-  std::ranges::sort(results.not_shown, {}, &NotShown::file);
+  std::erase_if(tables, [&](const fs::path& table) {
+    const auto of = [&](const FoundResult& result) { return is_table_of(table, result); };
+    const auto beside = [&](const NotShown& other) {
+      return is_table_of(table, {ResultKind::none, other.file});
+    };
+    return std::ranges::any_of(found, of) || std::ranges::any_of(results.not_shown, beside);
+  });
   for (const FoundResult& result : found) {
     const auto shows = [&](const FoundResult& whole) { return is_part_of(result, whole); };
     if (std::ranges::none_of(found, shows)) results.shown.push_back(result.file);
   }
+  for (NotShown& other : not_shown_tables(tables)) results.not_shown.push_back(std::move(other));
   return results;
 }
 
 std::string Viewed::html() const {
   if (pages.size() == 1 && not_shown.empty()) return pages.front().html();
-  return html_of(
-      pages, mapped<std::string>(files, [](const fs::path& f) { return f.filename().string(); }),
-      mapped<std::string>(not_shown, [](const NotShown& n) { return n.reason.what(); }));
+  return html_of(pages, names,
+                 mapped<std::string>(not_shown, [](const NotShown& n) { return n.reason.what(); }));
 }
 
 Viewed view_path(const fs::path& path, const ViewOptions& options) {
   Viewed viewed;
   if (!fs::is_directory(path)) {
     viewed.files = {path};
+    viewed.names = {path.filename().string()};
     viewed.pages = {view_file(path, options)};
     return viewed;
   }
@@ -132,19 +223,27 @@ Viewed view_path(const fs::path& path, const ViewOptions& options) {
   if (found.shown.empty() && found.not_shown.empty()) {
     throw bad_input(path.string(), "is a folder without a result that tpm view shows", kShownFiles);
   }
-  if (found.shown.empty()) {
-    const Error& first = found.not_shown.front().reason;
-    if (found.not_shown.size() == 1) throw first;
-    throw first.within(fmt::format("{}: {} files that tpm view does not show, the first",
-                                   path.string(), found.not_shown.size()));
-  }
   if (found.shown.size() > kMostResultsOfPage) {
     throw bad_input(path.string(), fmt::format("holds {} results", found.shown.size()),
                     fmt::format("{} at most on one page, or one of them", kMostResultsOfPage));
   }
-  for (const fs::path& file : found.shown) viewed.pages.push_back(view_file(file, options));
-  viewed.files = std::move(found.shown);
   viewed.not_shown = std::move(found.not_shown);
+  for (const fs::path& file : found.shown) {
+    try {
+      viewed.pages.push_back(view_file(file, options));
+      viewed.files.push_back(file);
+    } catch (const Error& error) {  // one damaged file does not hide the others
+      if (error.code() != ExitCode::bad_input) throw;
+      viewed.not_shown.push_back({file, error});
+    }
+  }
+  if (viewed.pages.empty()) {
+    const Error& first = viewed.not_shown.front().reason;
+    if (viewed.not_shown.size() == 1) throw first;
+    throw first.within(fmt::format("{}: {} files that tpm view does not show, the first",
+                                   path.string(), viewed.not_shown.size()));
+  }
+  viewed.names = names_within(path, viewed.files);
   return viewed;
 }
 
@@ -158,6 +257,7 @@ ViewPage view_file(const fs::path& file, const ViewOptions& options) {
     case FirstBytes::json:
       return fit::view_fit(file, bytes);
     case FirstBytes::other:
+      if (is_table(bytes)) throw no_result(file, 1);
       break;
   }
   throw bad_input(file.string(), "is nothing that tpm view shows", kShownFiles);

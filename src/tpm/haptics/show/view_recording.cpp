@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <optional>
 
 #include "tpm/base/namespaces.hpp"
 #include "tpm/base/text.hpp"
@@ -66,6 +67,19 @@ class RowCurves {
   std::size_t part_;
   Json time_;
 };
+
+/// When the hand felt most: the first cycle of the largest force sent to the device.
+std::optional<double> time_of_largest_force(const HilRecording& recording) {
+  std::optional<double> time_s;
+  double largest_N = -1.0;
+  for (const ServoRecord& row : shown_rows(recording)) {
+    const double force_N = std::abs(recording.commanded_N(row));
+    if (!(force_N > largest_N)) continue;
+    largest_N = force_N;
+    time_s = recording.time_s(row);
+  }
+  return time_s;
+}
 
 void add_curves(const HilRecording& recording, std::size_t most_samples, ViewPage& page) {
   constexpr double kMilli = 1e3, kMicro = 1e6;
@@ -219,6 +233,7 @@ ViewPage view_recording(const std::filesystem::path& file, std::string_view byte
   page.description["badge"] = recording.simulated() ? "SIMULATED DEVICE" : "HARDWARE";
   add_session_facts(recording, page);
   add_phases(recording, page);
+  if (const auto peak = time_of_largest_force(recording)) page.description["start_s"] = *peak;
   add_curves(recording, options.most_samples, page);
   if (!options.organ) {
     page.fact("organ", "not recomputed (--no-organ)");

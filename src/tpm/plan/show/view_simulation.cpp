@@ -2,8 +2,11 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <cmath>
 #include <optional>
+#include <string>
+#include <vector>
 
 #include "tpm/base/text.hpp"
 #include "tpm/files/hdf5/hdf5.hpp"
@@ -71,9 +74,88 @@ std::vector<std::size_t> shown_states(std::size_t states, std::size_t spheres, s
   return shown;
 }
 
+/// A contact of the scene in the file.
+struct ShownContact {
+  std::string name;  ///< "contact 2: punch"
+  bool is_tool = false;
+  bool is_still = false;  ///< a tool that nothing moves
+  std::string curves;     ///< group of its own curves; empty for the scene's protocol
+
+  /// Its protocol is that of the scene.
+  [[nodiscard]] bool is_driven() const { return curves.empty() && !is_still; }
+};
+
+/// The contacts in the order of the scene; none if the scene names none.
+std::vector<ShownContact> contacts_in(const Hdf5Reader& file) {
+  std::vector<ShownContact> contacts;
+  if (!file.has_attribute("/", "scene")) return contacts;
+  const Json scene = Json::parse(file.attribute("/", "scene"), nullptr, false);
+  if (!scene.is_object() || !scene.contains("contacts")) return contacts;
+  std::vector<double> shares;  // of the tools
+  if (file.has("/tools/share")) shares = file.numbers("/tools/share");
+  std::size_t tools = 0;
+  for (const Json& contact : scene.at("contacts")) {
+    const Json stated = contact.is_object() ? contact.value("kind", Json()) : Json();
+    const std::string kind = stated.is_string() ? stated.get<std::string>() : "sphere";
+    const std::size_t number = contacts.size() + 1;
+    const std::string group = fmt::format("/contacts/{}", number);
+    const bool is_tool = kind == "ball" || kind == "punch";
+    const bool is_still = is_tool && tools < shares.size() && shares[tools] == 0.0;
+    tools += is_tool ? 1U : 0U;
+    contacts.push_back({fmt::format("contact {}: {}", number, kind), is_tool, is_still,
+                        file.has(group) ? group : ""});
+  }
+  return contacts;
+}
+
+/// Name of the curves of the scene's protocol, which may drive several contacts.
+std::string name_of_driven(const std::vector<ShownContact>& contacts, const char* alone) {
+  if (contacts.size() < 2) return alone;
+  std::vector<std::string> names;
+  for (const ShownContact& contact : contacts) {
+    if (contact.is_driven()) names.push_back(contact.name);
+  }
+  return fmt::format("{}", fmt::join(names, " + "));
+}
+
+/// Forces of tools that have no curve of their own, each along its direction, at the shown states.
+Json forces_of_tools(const Hdf5Reader& file, const std::filesystem::path& path,
+                     const std::vector<std::size_t>& shown,
+                     const std::vector<ShownContact>& contacts, ViewPage& page) {
+  Json series = Json::array();
+  const Json& organ = page.description.at("organ");
+  if (!organ.contains("tools") || contacts.size() < 2) return series;
+  // The force of a contact that is driven alone is the curve.
+  const bool together = std::ranges::count_if(contacts, &ShownContact::is_driven) > 1;
+  const Json& tools = organ.at("tools");
+  const std::size_t count = tools.at("radius_m").size();
+  std::size_t tool = 0;
+  for (const ShownContact& contact : contacts) {
+    if (!contact.is_tool) continue;
+    const std::size_t t = tool++;
+    if (!contact.curves.empty() || !(together || contact.is_still)) continue;
+    std::vector<double> force_N;
+    for (const std::size_t step : shown) {
+      const std::vector<double> on_tissue =
+          table_of(file, path, step_name(step, "tools/force_on_tissue_N"), 3 * count);
+      double along = 0.0;
+      for (std::size_t c = 0; c < 3; ++c) {
+        along += on_tissue[3 * t + c] * tools.at("direction").at(3 * t + c).get<double>();
+      }
+      force_N.push_back(along);
+    }
+    series.push_back({{"kind", "trail"},
+                      {"label", contact.name},
+                      {"x", organ.at("time_s")},
+                      {"y", page.put(force_N)}});
+  }
+  return series;
+}
+
 /// The tools in the shown states: a ball is placed by its centre, a punch by its face.
 void add_tools(const Hdf5Reader& file, const std::filesystem::path& path,
-               const std::vector<std::size_t>& shown, ViewPage& page, Json& organ) {
+               const std::vector<std::size_t>& shown, const std::vector<ShownContact>& contacts,
+               ViewPage& page, Json& organ) {
   if (!file.has("/tools/kind")) return;
   constexpr std::uint64_t kKinds = 2;
   const std::vector<std::uint32_t> kind = whole_numbers(file, path, "/tools/kind", kKinds);
@@ -91,6 +173,16 @@ void add_tools(const Hdf5Reader& file, const std::filesystem::path& path,
   if (organ["tools"]["radius_m"].size() != kind.size()) {
     throw bad_input(path.string() + ": /tools/radius_m", "has another length than /tools/kind",
                     kExpectedResult);
+  }
+  const auto is_tool = [](const ShownContact& contact) { return contact.is_tool; };
+  if (std::ranges::count_if(contacts, is_tool) != std::ssize(kind)) {
+    throw bad_input(path.string() + ": /tools/kind",
+                    "has another length than the tools of its scene", kExpectedResult);
+  }
+  if (contacts.size() < 2) return;
+  organ["tools"]["names"] = Json::array();
+  for (const ShownContact& contact : contacts) {
+    if (contact.is_tool) organ["tools"]["names"].push_back(contact.name);
   }
 }
 
@@ -115,8 +207,10 @@ std::optional<double> time_of_peak(const Hdf5Reader& file, const std::filesystem
   return largest_point(curve, tolerance).time_s;
 }
 
-void add_organ(const Hdf5Reader& file, const std::filesystem::path& path, std::size_t most,
-               ViewPage& page) {
+/// Answers the states that the page holds.
+std::vector<std::size_t> add_organ(const Hdf5Reader& file, const std::filesystem::path& path,
+                                   std::size_t most, const std::vector<ShownContact>& contacts,
+                                   ViewPage& page) {
   const std::vector<double> rest = file.table("/spheres/position_m");
   const std::size_t spheres = rest.size() / 3;
   const std::vector<double> times = file.numbers("/steps/time_s");
@@ -143,27 +237,74 @@ void add_organ(const Hdf5Reader& file, const std::filesystem::path& path, std::s
   }
   if (file.has("/probe/sphere")) organ["contact"] = file.numbers("/probe/sphere").at(0) - 1.0;
   if (file.has("/probe/direction")) organ["push"] = file.numbers("/probe/direction");
-  add_tools(file, path, shown, page, organ);
+  add_tools(file, path, shown, contacts, page, organ);
   page.description["organ"] = std::move(organ);
+  return shown;
 }
 
-/// A curve over time in the unit that people read.
-void add_plot(ViewPage& page, const std::string& time, const Hdf5Reader& file,
-              const std::string& name, const char* title, const char* unit, double scale) {
-  if (!file.has(name)) return;
-  std::vector<double> values = file.numbers(name);
-  for (double& v : values) v *= scale;
-  page.plot_over_time(title, unit,
-                      {{{"kind", "line"}, {"label", title}, {"x", time}, {"y", page.put(values)}}});
-}
+/// Curves over time, of each contact that has them, in the unit that people read.
+class ContactCurves {
+ public:
+  ContactCurves(const Hdf5Reader& file, const std::filesystem::path& path,
+                const std::vector<ShownContact>& contacts, ViewPage& page)
+      : file_(file), path_(path), contacts_(contacts), page_(page) {
+    const std::vector<double> times = file.numbers("/curve/time_s");
+    samples_ = times.size();
+    time_ = page.put(times);
+  }
 
-void add_curves(const Hdf5Reader& file, ViewPage& page) {
+  /// @param quantity the end of its name, "force_N"
+  /// @param others of the same quantity and unit
+  void add(const char* quantity, const char* title, const char* unit, double scale,
+           const Json& others = Json::array()) {
+    Json series = Json::array();
+    put(series, "/curve/", quantity, name_of_driven(contacts_, title), scale);
+    for (const ShownContact& contact : contacts_) {
+      if (!contact.curves.empty()) {
+        put(series, contact.curves + "/", quantity, contact.name, scale);
+      }
+    }
+    for (const Json& other : others) series.push_back(other);
+    if (!series.empty()) page_.plot_over_time(title, unit, std::move(series));
+  }
+
+  /// Of the organ, not of one contact.
+  void add_of_whole(const char* quantity, const char* title, const char* unit, double scale) {
+    Json series = Json::array();
+    put(series, "/curve/", quantity, title, scale);
+    if (!series.empty()) page_.plot_over_time(title, unit, std::move(series));
+  }
+
+ private:
+  void put(Json& series, const std::string& group, const char* quantity, const std::string& label,
+           double scale) {
+    if (!file_.has(group + quantity)) return;
+    std::vector<double> values = file_.numbers(group + quantity);
+    if (values.size() != samples_) {
+      throw bad_input(path_.string() + ": " + group + quantity,
+                      fmt::format("has {} numbers", values.size()), fmt::format("{}", samples_));
+    }
+    for (double& v : values) v *= scale;
+    series.push_back({{"kind", "line"}, {"label", label}, {"x", time_}, {"y", page_.put(values)}});
+  }
+
+  const Hdf5Reader& file_;
+  const std::filesystem::path& path_;
+  const std::vector<ShownContact>& contacts_;
+  ViewPage& page_;
+  std::size_t samples_ = 0;
+  std::string time_;
+};
+
+/// @param forces of tools that have no curve of their own
+void add_curves(const Hdf5Reader& file, const std::filesystem::path& path,
+                const std::vector<ShownContact>& contacts, const Json& forces, ViewPage& page) {
   constexpr double kMilli = 1e3;
-  const std::string time = page.put(file.numbers("/curve/time_s"));
-  add_plot(page, time, file, "/curve/depth_m", "depth", "mm", kMilli);
-  add_plot(page, time, file, "/curve/force_N", "contact force", "N", 1.0);
-  add_plot(page, time, file, "/curve/load_N", "load", "N", 1.0);
-  add_plot(page, time, file, "/curve/dissipated_J", "dissipated energy", "mJ", kMilli);
+  ContactCurves curves(file, path, contacts, page);
+  curves.add("depth_m", "depth", "mm", kMilli);
+  curves.add("force_N", "contact force", "N", 1.0, forces);
+  curves.add("load_N", "load", "N", 1.0);
+  curves.add_of_whole("dissipated_J", "dissipated energy", "mJ", kMilli);
 }
 
 /// Claimed accuracy of a planned model, and its limits.
@@ -232,13 +373,17 @@ ViewPage view_simulation(const std::filesystem::path& path, std::string_view byt
   ViewPage page = begun_page("simulation", path, bytes);
   add_origin(file, page);
   add_claim(file, page);
+  const std::vector<ShownContact> contacts = contacts_in(file);
+  Json forces = Json::array();
   if (file.has("/spheres/position_m")) {
-    add_organ(file, path, options.most_numbers, page);
+    const std::vector<std::size_t> shown =
+        add_organ(file, path, options.most_numbers, contacts, page);
+    forces = forces_of_tools(file, path, shown, contacts, page);
   } else {
     page.fact("organ", "this formulation does not show whole states: there is no organ to turn");
   }
   if (const auto peak = time_of_peak(file, path)) page.description["start_s"] = *peak;
-  add_curves(file, page);
+  add_curves(file, path, contacts, forces, page);
   return page;
 }
 
