@@ -359,9 +359,8 @@ void require_no_other_sweep(const ColumnChoice& choice, const std::string& file)
 }
 
 /// The columns of a recording. Those of an AFM are a height, and a deflection or a force.
-std::vector<Use> recording_uses(const DelimitedTable& table, const MachineHeader& header,
-                                const ColumnChoice& choice, const std::string& file,
-                                const ImportOptions& options) {
+std::vector<Use> recording_uses(const MachineHeader& header, const ColumnChoice& choice,
+                                const std::string& file, const ImportOptions& options) {
   const MachineColumn* time = choice.find(ColumnRole::time, options.time_column, "--time");
   if (time == nullptr) time = choice.lone_clock();
   const MachineColumn* drive = choice.find(ColumnRole::drive, options.drive_column, "--drive");
@@ -438,7 +437,7 @@ ImportedSeries read_machine(const DelimitedTable& table, const std::string& file
   for (const auto& [selector, unit] : options.units) choice.require_column_for_unit(selector);
   std::vector<Use> uses = spectrum_uses(choice, file, options);
   const bool spectrum = !uses.empty();
-  if (!spectrum) uses = recording_uses(table, header, choice, file, options);
+  if (!spectrum) uses = recording_uses(header, choice, file, options);
   require_units(uses, file);
   SeriesReader reader(table, header, uses, file);
   for (const Use& use : uses) reader.add(use);
