@@ -192,6 +192,12 @@ TEST_CASE("what was asked for, limits and other quantities have no meaning") {
   }
   CHECK(recognize_title("Nominal strain")->quantity == Quantity::strain);
   CHECK(recognize_title("Nenndehnung")->quantity == Quantity::strain);
+  const TableReader engineering;
+  const Recording nominal =
+      engineering("Time [s],Nominal strain [%],Nominal stress [kPa]\n0,0,0\n1,1,1\n2,2,2\n3,2,1\n")
+          .recording;
+  CHECK(nominal.response_quantity == Quantity::stress);
+  CHECK(nominal.response[2] == 2e3);
   CHECK(recognize_title("Stretch ratio"));
   CHECK(recognize_title("SD of force")->role == ColumnRole::sd);
   const TableReader read;
