@@ -135,6 +135,14 @@ TEST_CASE("a reading of 0 at the step itself is from before it") {
   CHECK(file.recording.time_s.front() == 0.5);
   CHECK_THAT(told(file.findings, "left out"), Contains("before the step"));
   CHECK(read(head + "0,1\n0.5,2\n1,3\n2,4\n4,5\n").recording.time_s.front() == 0.0);
+  // The strain has its noise before the step, too.
+  for (const char* noise : {"0.001", "-0.001"}) {
+    CAPTURE(noise);
+    const RecordingFile noisy =
+        read(fmt::format("t [s],Stress [Pa],Strain [%]\n0,5,{}\n0.5,5,2\n1,5,3\n2,5,4\n", noise));
+    CHECK(noisy.recording.time_s.front() == 0.5);
+    CHECK_THAT(told(noisy.findings, "left out"), Contains("the reading at 0 s"));
+  }
 }
 
 TEST_CASE("storage and loss compliance become moduli") {

@@ -159,6 +159,8 @@ TEST_CASE("what was asked for, limits and other quantities have no meaning") {
                             "Peak load",
                             "Force limit",
                             "Position error",
+                            "Nominal force",
+                            "Nennkraft",
                             "Sollkraft",
                             "Kraft-Soll",
                             "Wegsollwert",
@@ -178,6 +180,22 @@ TEST_CASE("what was asked for, limits and other quantities have no meaning") {
     CHECK_FALSE(recognize_title(title));
     CHECK(refused_title(title));
   }
+  // Nominal as engineering: of the specimen before the test.
+  for (const char* title : {"Nominal stress", "Stress (nominal)", "Nennspannung",
+                            "Contrainte nominale", "Esfuerzo nominal"}) {
+    INFO(title);
+    REQUIRE(recognize_title(title));
+    CHECK(recognize_title(title)->quantity == Quantity::stress);
+    CHECK_FALSE(refused_title(title));
+  }
+  CHECK(recognize_title("Nominal strain")->quantity == Quantity::strain);
+  CHECK(recognize_title("Nenndehnung")->quantity == Quantity::strain);
+  const TableReader engineering;
+  const Recording nominal =
+      engineering("Time [s],Nominal strain [%],Nominal stress [kPa]\n0,0,0\n1,1,1\n2,2,2\n3,2,1\n")
+          .recording;
+  CHECK(nominal.response_quantity == Quantity::stress);
+  CHECK(nominal.response[2] == 2e3);
   CHECK(recognize_title("Stretch ratio"));
   CHECK(recognize_title("SD of force")->role == ColumnRole::sd);
   const TableReader read;
@@ -189,6 +207,18 @@ TEST_CASE("what was asked for, limits and other quantities have no meaning") {
   // Alone, such a column is not taken either; the option that takes it is named.
   CHECK_THAT(read.refusal("Time [s],Depth command [mm],Channel 3,Force [N]\n" + rows),
              Contains("--drive 2 to take this one"));
+}
+
+TEST_CASE("columns that already mean something are not offered as the missing one") {
+  const TableReader read;
+  const std::string rows = "0,1,2\n1,2,3\n2,3,4\n3,4,5\n";
+  const std::string tonometer = read.refusal("Time (s),Pressure (mmHg),Weight\n" + rows);
+  CHECK_THAT(tonometer, Contains("--response with one of column 2 'Pressure"));
+  CHECK_THAT(tonometer, !Contains("'Time'"));
+  CHECK_THAT(read.refusal("Time (s),Depth (mm)\n0,1\n1,2\n2,3\n"),
+             Contains("a column of it with its unit, such as Force (N)"));
+  CHECK_THAT(read.refusal("Minute,Force (N)\n0,1\n1,2\n2,3\n"),
+             Contains("--time or --drive with one of column 1 'Minute'") && !Contains("'Force'"));
 }
 
 TEST_CASE("two columns of one rank are refused where their numbers differ") {
@@ -398,7 +428,8 @@ TEST_CASE("the table of an AFM: depth is height minus deflection") {
   CHECK_THAT(r.drive.back(), WithinRel(3e-6 - 80e-9, 1e-12));
   CHECK_THAT(r.response.back(), WithinRel(4e-9, 1e-12));
   const std::string volts = "Time [s],Piezo height [um],Deflection [V]\n0,0,0\n1,1,0.4\n2,2,0.8\n";
-  CHECK_THAT(read.refusal(volts), Contains("--spring-constant"));
+  CHECK_THAT(read.refusal(volts),
+             Contains("--spring-constant") && Contains("and --deflection-sensitivity"));
   CHECK_THAT(read.refusal(volts, options), Contains("--deflection-sensitivity"));
   set_reading_option(options, "deflection_sensitivity", "50 nm/V", "test");
   const Recording v = read(volts, options).recording;

@@ -191,6 +191,32 @@ TEST_CASE("titles and units are read in comments, which name no columns otherwis
                           Contains("--time 1 --drive 2 --response 3 --unit 1=s"));
 }
 
+TEST_CASE("comments between the samples of a machine's table do not part them") {
+  const test::TempFolder folder;
+  std::string text = "// exported\nTime (s),Depth (mm),Force (N)\n";
+  for (int i = 0; i <= 20; ++i) {
+    text += fmt::format("{},{},{}\n", i, 2 * i, 3 * i);
+    if (i == 9) text += "// hold begins\n\n# filter off\n";
+  }
+  write_file(folder / "t.csv", text);
+  const Recording r = read_recording_file(folder / "t.csv", {}).recording;
+  CHECK(r.time_s.size() == 21);
+  CHECK(r.response.back() == 60.0);
+}
+
+TEST_CASE("a column of times of day is the time, whatever its title") {
+  for (const char* title : {"Zeitstempel", "Horodatage", "Date/Heure", "when"}) {
+    CAPTURE(title);
+    const test::TempFolder folder;
+    std::string text = fmt::format("{};Kraft [N];Weg [mm]\n", title);
+    for (int i = 0; i <= 20; ++i) text += fmt::format("05.03.2024 10:12:{:02},5;{};{}\n", i, i, i);
+    write_file(folder / "t.csv", text);
+    const Recording r = read_recording_file(folder / "t.csv", {}).recording;
+    REQUIRE(r.time_s.size() == 21);
+    CHECK_THAT(r.time_s.back() - r.time_s.front(), WithinRel(20.0, 1e-9));
+  }
+}
+
 TEST_CASE("columns of logarithms are refused by their titles") {
   for (const char* titles : {"log w,log G',log G''", "log10(omega),log10(G'),log10(G'')",
                              "lg f / Hz,lg E' / Pa,lg E'' / Pa", "ln t,ln force,ln depth"}) {

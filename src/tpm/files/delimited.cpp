@@ -317,23 +317,30 @@ class RowParser {
   bool open_ = false;
 };
 
+/// Length of the mark before a comment: '#', and "//" where machines write the table. 0 without
+/// one.
+std::size_t comment_mark(std::string_view line, const DelimitedOptions& options) {
+  if (line.starts_with('#')) return 1;
+  return options.ragged && line.starts_with("//") ? 2 : 0;
+}
+
 /// Rows, and comments into `comments`. Throws for long lines and misplaced quotes.
 std::vector<DelimitedRow> read_rows(DelimitedText& text, char separator, std::string_view where,
-                                    std::size_t longest_line,
+                                    const DelimitedOptions& options,
                                     std::vector<DelimitedComment>& comments) {
   RowParser parser(text, separator);
   LineReader lines(text.text);
   std::string_view line;
   while (lines.next(line)) {
-    if (line.size() > longest_line) {
+    if (line.size() > options.longest_line) {
       throw bad_input(at_line(where, lines.number()),
                       fmt::format("the line is {} bytes long", line.size()),
-                      fmt::format("at most {} bytes a line", longest_line));
+                      fmt::format("at most {} bytes a line", options.longest_line));
     }
     if (!parser.inside_row()) {
       if (is_blank(line)) continue;
-      if (line.starts_with('#')) {
-        comments.push_back({lines.number(), std::string(line.substr(1))});
+      if (const std::size_t mark = comment_mark(line, options); mark > 0) {
+        comments.push_back({lines.number(), std::string(line.substr(mark))});
         continue;
       }
     }
@@ -408,7 +415,7 @@ DelimitedTable parse_delimited(std::string_view bytes, std::string_view where,
   table.text = text;
   table.encoding = decoded.encoding;
   table.separator = options.separator ? *options.separator : find_separator(text->text);
-  table.rows = read_rows(*text, table.separator, where, options.longest_line, table.comments);
+  table.rows = read_rows(*text, table.separator, where, options, table.comments);
   if (table.rows.empty()) throw bad_input(where, "no rows", "at least one row of fields");
   if (!options.ragged) require_same_width(table.rows, where);
   table.decimal_comma = options.decimal_comma.value_or(uses_decimal_comma(table.rows));

@@ -36,7 +36,7 @@ struct DelimitedRow {
   std::span<const std::string_view> fields;
 };
 
-/// A line that starts with '#', without it.
+/// A line that starts with '#', or with "//" in a ragged table, without that mark.
 struct DelimitedComment {
   int line = 0;  ///< from 1
   std::string text;

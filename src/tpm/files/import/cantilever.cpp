@@ -6,6 +6,8 @@
 #include <cmath>
 #include <numeric>
 #include <optional>
+#include <string>
+#include <string_view>
 
 #include "tpm/base/namespaces.hpp"
 #include "tpm/base/text.hpp"
@@ -206,10 +208,14 @@ void resolve_cantilever(ImportedSeries& series, const std::vector<CantileverColu
     return;
   }
   if (!options.spring_constant_N_per_m) {
+    constexpr std::string_view kSensitivity =
+        ", and --deflection-sensitivity, such as --deflection-sensitivity \"50 nm/V\"";
+    const bool without_sensitivity = volts && !options.deflection_sensitivity_m_per_V;
     if (found.deflection) {
       throw bad_input(fmt::format("{}: {}", file, columns[*found.deflection].column->label()),
                       "a deflection without the spring constant of its cantilever",
-                      "--spring-constant, such as --spring-constant \"0.05 N/m\"");
+                      fmt::format("--spring-constant, such as --spring-constant \"0.05 N/m\"{}",
+                                  without_sensitivity ? std::string(kSensitivity) : ""));
     }
     if (!found.force) return;
     series.findings.push_back(ImportFinding::told_of(

@@ -176,6 +176,24 @@ const MachineColumn* ColumnChoice::find(ColumnRole role, const std::string& sele
   return by_title(role, option);
 }
 
+bool ColumnChoice::is_clock(const MachineColumn& column) const {
+  for (std::size_t i = header_.block.first; i < header_.block.end; ++i) {
+    const std::string_view field = field_at(table_.rows[i], column.index);
+    if (!field.empty()) return is_clock_text(field);
+  }
+  return false;
+}
+
+const MachineColumn* ColumnChoice::lone_clock() const {
+  const MachineColumn* lone = nullptr;
+  for (const MachineColumn& column : header_.columns) {
+    if (column.meaning || column.refused || !is_clock(column)) continue;
+    if (lone != nullptr) return nullptr;
+    lone = &column;
+  }
+  return lone;
+}
+
 const MachineColumn* ColumnChoice::refused(ColumnRole role) const {
   for (const MachineColumn& column : header_.columns) {
     const bool asked = column.refused && column.refused->asked;

@@ -29,6 +29,13 @@ class ColumnChoice {
   [[nodiscard]] const MachineColumn* by_title(ColumnRole role, const char* option,
                                               const Condition& condition = {}) const;
 
+  /// True if its cells are times of day, with a date or without.
+  [[nodiscard]] bool is_clock(const MachineColumn& column) const;
+
+  /// The only column whose title means nothing and that is_clock(), such as 'Zeitstempel'; null if
+  /// there is none.
+  [[nodiscard]] const MachineColumn* lone_clock() const;
+
   /// A column of what was asked for in this role; null if there is none.
   [[nodiscard]] const MachineColumn* refused(ColumnRole role) const;
 

@@ -358,20 +358,11 @@ void require_no_other_sweep(const ColumnChoice& choice, const std::string& file)
                               choice.list()));
 }
 
-bool is_clock(const DelimitedTable& table, const MachineHeader& header,
-              const MachineColumn& column) {
-  for (std::size_t i = header.block.first; i < header.block.end; ++i) {
-    const std::string_view field = field_at(table.rows[i], column.index);
-    if (!field.empty()) return is_clock_text(field);
-  }
-  return false;
-}
-
 /// The columns of a recording. Those of an AFM are a height, and a deflection or a force.
-std::vector<Use> recording_uses(const DelimitedTable& table, const MachineHeader& header,
-                                const ColumnChoice& choice, const std::string& file,
-                                const ImportOptions& options) {
+std::vector<Use> recording_uses(const MachineHeader& header, const ColumnChoice& choice,
+                                const std::string& file, const ImportOptions& options) {
   const MachineColumn* time = choice.find(ColumnRole::time, options.time_column, "--time");
+  if (time == nullptr) time = choice.lone_clock();
   const MachineColumn* drive = choice.find(ColumnRole::drive, options.drive_column, "--drive");
   if (drive == nullptr) drive = choice.by_title(ColumnRole::height, "--drive");
   const MachineColumn* response = response_column(choice, drive, options);
@@ -391,8 +382,10 @@ std::vector<Use> recording_uses(const DelimitedTable& table, const MachineHeader
           "--unit 2=mm --unit 3=N, if they are these");
     }
     require_more_than_ratio(header, file);
+    const std::string others = choice.list({time, drive});
     throw bad_input(file, "no column is recognised as a force, stress, modulus or compliance",
-                    fmt::format("--response with one of {}", choice.list()));
+                    others.empty() ? std::string("a column of it with its unit, such as Force (N)")
+                                   : fmt::format("--response with one of {}", others));
   }
   const Quantity observed = response_quantity(*response, options);
   if (drive == nullptr && !is_step_response(observed)) {
@@ -401,13 +394,13 @@ std::vector<Use> recording_uses(const DelimitedTable& table, const MachineHeader
   if (time == nullptr && drive == nullptr) {
     require_not_refused(choice, ColumnRole::time, file, "--time");
     throw bad_input(file, "no column is recognised as time or displacement",
-                    fmt::format("--time or --drive with one of {}", choice.list()));
+                    fmt::format("--time or --drive with one of {}", choice.list({response})));
   }
 
   std::vector<Use> uses;
   if (time != nullptr) {
     uses.push_back({time, Quantity::time, Bound::value, false});
-    uses.back().clock = is_clock(table, header, *time);
+    uses.back().clock = choice.is_clock(*time);
   }
   Use answer{response, observed, Bound::value, options.negate_response};
   answer.volts = is_deflection(*response) && (response->unit == "V" || response->unit == "mV");
@@ -444,7 +437,7 @@ ImportedSeries read_machine(const DelimitedTable& table, const std::string& file
   for (const auto& [selector, unit] : options.units) choice.require_column_for_unit(selector);
   std::vector<Use> uses = spectrum_uses(choice, file, options);
   const bool spectrum = !uses.empty();
-  if (!spectrum) uses = recording_uses(table, header, choice, file, options);
+  if (!spectrum) uses = recording_uses(header, choice, file, options);
   require_units(uses, file);
   SeriesReader reader(table, header, uses, file);
   for (const Use& use : uses) reader.add(use);

@@ -162,11 +162,25 @@ constexpr auto kJoinedEnds = std::to_array<RefusingWord>({
     {"abweichung", kError},
 });
 
+/// A nominal stress or strain is measured: the force over the area, or the displacement over the
+/// length, before the test.
+bool is_engineering(std::string_view word, const std::vector<std::string>& words) {
+  constexpr auto kNominal = std::to_array<std::string_view>({"nominal", "nominale"});
+  constexpr auto kJoined = std::to_array<std::string_view>({"nennspannung", "nenndehnung"});
+  constexpr auto kReferred = std::to_array<std::string_view>(
+      {"stress", "strain", "spannung", "dehnung", "stauchung", "contrainte", "deformation",
+       "esfuerzo", "deformacion", "sforzo", "deformazione"});
+  if (std::ranges::find(kJoined, word) != kJoined.end()) return true;
+  const bool referred = std::ranges::find_first_of(words, kReferred) != words.end();
+  return referred && std::ranges::find(kNominal, word) != kNominal.end();
+}
+
 }  // namespace
 
 std::optional<RefusedWord> find_refused_word(const std::vector<std::string>& words) {
   for (std::size_t i = 0; i < words.size(); ++i) {
     const std::string& word = words[i];
+    if (is_engineering(word, words)) continue;
     const auto found = [&word](std::string_view why) {
       return RefusedWord{word, why, why == kAsked};
     };

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 #include <numeric>
+#include <string>
 #include <vector>
 
 #include "tpm/base/namespaces.hpp"
@@ -155,18 +156,23 @@ void sort_shuffled_rows(ImportedSeries& series) {
 
 void leave_out_zero_at_step(ImportedSeries& series) {
   constexpr std::size_t kFewest = 4;
+  constexpr double kNearZero = 0.02;  // of the next reading: 0 and its noise
   const ImportedColumn* time = time_of(series);
   if (time == nullptr || !holds_step_response(series) || time->values.size() < kFewest) return;
   const auto answer = std::ranges::find_if(series.columns, [](const ImportedColumn& column) {
     return is_step_response(column.quantity) && column.bound == Bound::value;
   });
-  const bool zero = time->values[0] == 0.0 && answer->values[0] == 0.0;
-  if (!zero || !(time->values[1] > 0.0) || !(answer->values[1] > 0.0)) return;
+  const double first = answer->values[0], next = answer->values[1];
+  const bool zero = time->values[0] == 0.0 && std::abs(first) <= kNearZero * next;
+  if (!zero || !(time->values[1] > 0.0) || !(next > 0.0)) return;
+  const std::string words = first == 0.0 ? std::string("the reading of 0 at 0 s")
+                                         : fmt::format("the reading at 0 s ({} % of the next one)",
+                                                       significant(100.0 * first / next, 2));
   const std::size_t rows = time->values.size();
   for (ImportedColumn& column : series.columns) keep_rows(column.values, 1, rows);
   keep_rows(series.lines, 1, rows);
   series.findings.push_back(
-      ImportFinding::told_of("left out", "the reading of 0 at 0 s, which is from before the step"));
+      ImportFinding::told_of("left out", words + ", which is from before the step"));
 }
 
 bool counts_from_step(const std::vector<double>& times) {
