@@ -2,6 +2,7 @@
 // Output of a budget: JSON, terminal, CSV.
 #include <fmt/format.h>
 
+#include "tpm/base/sized_unit.hpp"
 #include "tpm/base/text.hpp"
 #include "tpm/fit/predict/error_budget.hpp"
 #include "tpm/plan/perception.hpp"
@@ -74,9 +75,9 @@ Json to_json(const ErrorBudget& b) {
 }
 
 std::string to_terminal_text(const ErrorBudget& b) {
-  std::string text =
-      fmt::format("{}, peak {} N; in % of it\n\n{:<16} {:<12} {:<24} {:>9} {:>9}\n", b.title,
-                  significant(b.peak_N, 4), "line", "kind", "from -> to", "largest", "rms");
+  std::string text = fmt::format("{}, peak {}; in % of it\n\n{:<16} {:<12} {:<24} {:>9} {:>9}\n",
+                                 b.title, sized_text(Dimension::force, b.peak_N, 4), "line", "kind",
+                                 "from -> to", "largest", "rms");
   for (const BudgetLine& line : b.lines) {
     text +=
         fmt::format("{:<16} {:<12} {:<24} {:>9} {:>9}{}\n", line.name, budget_kind_name(line.kind),

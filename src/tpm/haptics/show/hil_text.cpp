@@ -196,6 +196,12 @@ std::string newtons(double force_N, int digits = 3) {
   return sized_text(Dimension::force, force_N, digits);
 }
 
+/// motion_cost() in the unit that fits the force.
+std::string cost_words(const Verification& v) {
+  return v.motion_error_N ? fmt::format("which can cost {}", newtons(*v.motion_error_N))
+                          : motion_cost(v, 1.0, "N");
+}
+
 std::string said_by_device(const ServoOutcome& o, const std::vector<DeviceFinding>& findings) {
   std::string text;
   if (o.device.error != 0) {
@@ -349,7 +355,7 @@ std::string run_text(const HilSession& session, const SessionRun& run) {
       o.counts.force_limited, o.counts.slipped, o.counts.damped, o.counts.beyond_model,
       o.dropped_records);
   text += fmt::format(
-      "largest force {} N{}\n", significant(run.largest_force_N, 3),
+      "largest force {}{}\n", newtons(run.largest_force_N),
       run.largest_force_N >= kLeastFeltForce_N
           ? std::string()
           : fmt::format(": no hand feels it (less than {} N, assumed)", kLeastFeltForce_N));
@@ -400,36 +406,34 @@ std::string motion_cost(const Verification& v, double per_newton, std::string_vi
 
 std::string verification_text(const HilRecording& recording, const Verification& v) {
   std::string text = fmt::format(
-      "{}\n{}\nverified {} against: {}\nmotion through {} knots within {} um, {}; the "
-      "reference's own error estimate {} N\n",
+      "{}\n{}\nverified {} against: {}\nmotion through {} knots within {}, {}; the "
+      "reference's own error estimate {}\n",
       recording.session.title, device_line(recording), verified_words(recording, v), v.reference,
-      v.knots, significant(1e6 * v.motion_tolerance_m, 3), motion_cost(v, 1.0, "N"),
-      significant(v.reference_error_N, 3));
-  text += fmt::format("{:<10} {:>7} {:>10} {:>10} {:>10}\n", "phase", "count", "rms mN", "max mN",
+      v.knots, sized_text(Dimension::length, v.motion_tolerance_m, 3), cost_words(v),
+      newtons(v.reference_error_N));
+  text += fmt::format("{:<10} {:>7} {:>12} {:>12} {:>10}\n", "phase", "count", "rms", "max",
                       "max/peak");
   const std::map<std::string, PhaseKindErrors> kinds = errors_by_kind(v);
   for (const auto& [name, kind] : kinds) {
-    text += fmt::format("{:<10} {:>7} {:>10} {:>10} {:>10}\n", name, kind.count,
-                        significant(1e3 * kind.rms_N(), 3), significant(1e3 * kind.max_N, 3),
-                        share(kind.max_N, v.all.peak_N));
+    text +=
+        fmt::format("{:<10} {:>7} {:>12} {:>12} {:>10}\n", name, kind.count, newtons(kind.rms_N()),
+                    newtons(kind.max_N), share(kind.max_N, v.all.peak_N));
   }
-  text += fmt::format("{:<10} {:>7} {:>10} {:>10} {:>10}   peak {} N\n", "all", v.phases.size(),
-                      significant(1e3 * v.all.rms_N, 3), significant(1e3 * v.all.max_N, 3),
-                      share(v.all.max_N, v.all.peak_N), significant(v.all.peak_N, 4));
+  text += fmt::format("{:<10} {:>7} {:>12} {:>12} {:>10}   peak {}\n", "all", v.phases.size(),
+                      newtons(v.all.rms_N), newtons(v.all.max_N), share(v.all.max_N, v.all.peak_N),
+                      newtons(v.all.peak_N, 4));
   for (const Remark& remark : all_remarks(recording, v)) text += "note: " + remark.text + "\n";
   for (const CrossCheck& o : v.others) {
-    text += fmt::format("beside: {}, {} to {} s: rms {} mN, max {} mN; {} mN from the reference\n",
-                        o.name, significant(o.start_s, 4), significant(o.end_s, 4),
-                        significant(1e3 * o.commanded.rms_N, 3),
-                        significant(1e3 * o.commanded.max_N, 3), significant(1e3 * o.apart_N, 3));
+    text += fmt::format("beside: {}, {} to {} s: rms {}, max {}; {} from the reference\n", o.name,
+                        significant(o.start_s, 4), significant(o.end_s, 4),
+                        newtons(o.commanded.rms_N), newtons(o.commanded.max_N), newtons(o.apart_N));
   }
   for (const BesideExperiment& e : v.experiment) {
-    text +=
-        fmt::format("experiment: {} mm at {} mm/s, {}: measured {} N, commanded {} N ({}): {}\n",
-                    significant(1e3 * e.depth_m, 3), significant(1e3 * e.rate_m_per_s, 3), e.label,
-                    significant(e.measured_N, 3), significant(e.commanded_N, 3),
-                    percent_text(100.0 * (e.commanded_N / e.measured_N - 1.0), 1),
-                    cause_of_difference(e, v.material));
+    text += fmt::format("experiment: {} mm at {} mm/s, {}: measured {}, commanded {} ({}): {}\n",
+                        significant(1e3 * e.depth_m, 3), significant(1e3 * e.rate_m_per_s, 3),
+                        e.label, newtons(e.measured_N), newtons(e.commanded_N),
+                        percent_text(100.0 * (e.commanded_N / e.measured_N - 1.0), 1),
+                        cause_of_difference(e, v.material));
   }
   return text;
 }
@@ -456,9 +460,7 @@ ShortAnswer short_answer(const HilRecording& recording, const Verification& v) {
   answer.limits = {
       fmt::format("limit: motion through {} knots within {}, {}; the reference's own error "
                   "estimate {}; the model's {}",
-                  v.knots, sized_text(Dimension::length, v.motion_tolerance_m, 3),
-                  v.motion_error_N ? fmt::format("which can cost {}", newtons(*v.motion_error_N))
-                                   : motion_cost(v, 1.0, "N"),
+                  v.knots, sized_text(Dimension::length, v.motion_tolerance_m, 3), cost_words(v),
                   newtons(v.reference_error_N), newtons(v.model_error_N))};
   constexpr std::size_t kShown = 3;  // of cross-checks
   for (std::size_t i = 0; i < std::min(v.others.size(), kShown); ++i) {
