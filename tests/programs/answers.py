@@ -247,8 +247,7 @@ def main():
                 print(f"tpm {line}: exit code {done.returncode}, and no JSON: '{done.stdout}'")
                 continue
             if line == "example recording":
-                for ending in (".csv", ".json"):
-                    shutil.copy(folder / f"recording{ending}", folder / f"my recording{ending}")
+                shutil.copy(folder / "recording.csv", folder / "my recording.csv")
             wrong = faults_of(answer, words, folder, done.returncode)
             if line.startswith(QUICK) and not line.startswith(UNENDED):
                 done = subprocess.run([program, *words], cwd=folder, capture_output=True, text=True, timeout=300)
