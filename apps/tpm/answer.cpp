@@ -3,10 +3,12 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <array>
 #include <filesystem>
 #include <stdexcept>
 #include <utility>
 
+#include "tpm/base/text.hpp"
 #include "tpm/files/files_read.hpp"
 #include "tpmkit/error.hpp"
 #include "tpmkit/version.hpp"
@@ -75,6 +77,28 @@ void add_end(Json& result, const fs::path& folder, const std::vector<std::string
   result["files"] =
       array_json(files, [&](const std::string& name) { return (folder / name).string(); });
   result["next"] = next.empty() ? Json(nullptr) : Json(next);
+}
+
+std::string next_line(const std::string& next) {
+  return next.empty() ? std::string() : fmt::format("next: {}\n", next);
+}
+
+std::string same_command(const Session& session, std::string_view more, std::string_view without) {
+  constexpr std::array<std::string_view, 3> kOfAnswer{"--format", "--output", "-o"};
+  std::string command = "tpm";
+  const auto names = std::ranges::find(session.words, "--");  // from there on all are names
+  for (auto word = session.words.begin(); word != names; ++word) {
+    if (std::ranges::find(kOfAnswer, *word) != kOfAnswer.end()) {
+      if (++word == names) break;  // its value
+      continue;
+    }
+    const bool of_answer = word->starts_with("--format=") || word->starts_with("--output=") ||
+                           (word->starts_with("-o") && word->size() > 2);
+    if (!of_answer && (without.empty() || *word != without)) command += " " + shell_quoted(*word);
+  }
+  if (!more.empty()) command += fmt::format(" {}", more);
+  for (auto word = names; word != session.words.end(); ++word) command += " " + shell_quoted(*word);
+  return command;
 }
 
 }  // namespace tpm::app

@@ -28,4 +28,14 @@ struct Verdict {
 void add_end(Json& result, const std::filesystem::path& folder,
              const std::vector<std::string>& files, const std::string& next);
 
+/// "next: COMMAND", the line that ends a text; none if there is no command.
+[[nodiscard]] std::string next_line(const std::string& next);
+
+/// The command line that was given, to be typed again with more options or without a flag; its
+/// answer goes to the terminal as text, so --format and --output are left out.
+/// @param more    "--folder budget", as a shell takes it
+/// @param without "--estimate"; may be empty
+[[nodiscard]] std::string same_command(const Session& session, std::string_view more,
+                                       std::string_view without = {});
+
 }  // namespace tpm::app

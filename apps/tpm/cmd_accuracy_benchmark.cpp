@@ -98,7 +98,9 @@ int record_speed(const BenchmarkChoice& choice, const Session& session) {
   const SpeedOrigin origin{choice.commit};
   append_speed_record(choice.record, rows, origin);
   if (session.json()) {
-    say("{}", answer_text(session, speed_json(rows, origin)));
+    Json json = speed_json(rows, origin);
+    add_end(json, {}, {choice.record}, {});
+    say("{}", answer_text(session, std::move(json)));
     return 0;
   }
   say("{}appended to {}\n", speed_text(rows), choice.record);
@@ -134,7 +136,12 @@ int benchmark(const BenchmarkChoice& choice, const Session& session) {
   }
   write_benchmark(record, choice.folder, python);
   if (session.json()) {
-    say("{}", answer_text(session, to_json(record)));
+    std::vector<std::string> files{"report.html", "report.md", "benchmark.json"};
+    for (const BenchmarkResult& result : record.results) files.push_back(result.name + ".csv");
+    files.emplace_back(python.empty() ? "figures.json" : "figures");
+    Json json = to_json(record);
+    add_end(json, choice.folder, files, {});
+    say("{}", answer_text(session, std::move(json)));
     return 0;
   }
   print_summary(record);

@@ -44,17 +44,19 @@ int verify_program(const VerificationChoice& choice, const Session& session) {
   const VerificationRun verification = run_verification(groups, flaw, [&] { progress.advance(); });
   const std::chrono::duration<double> took = std::chrono::steady_clock::now() - start;
   if (!choice.folder.empty()) write_verification(verification, choice.folder, took.count());
+  std::vector<std::string> files;
+  if (!choice.folder.empty()) {
+    files = {"report.html", "report.md", "verification.json", "verification.csv"};
+  }
   if (session.json()) {
-    say("{}",
-        answer_text(session, to_json(verification), {{"checks_hold", verification.failed() == 0}}));
+    Json json = to_json(verification);
+    add_end(json, choice.folder, files, {});
+    say("{}", answer_text(session, std::move(json), {{"checks_hold", verification.failed() == 0}}));
   } else {
     for (const VerificationLine& line : verification_lines(verification)) {
       line.failed ? write_alarming(line.text) : write_output(line.text);
     }
-    if (!choice.folder.empty()) {
-      say("{}", written(session, choice.folder,
-                        {"report.html", "report.md", "verification.json", "verification.csv"}));
-    }
+    if (!files.empty()) say("{}", written(session, choice.folder, files));
   }
   return exit_code(verification.failed() == 0);
 }

@@ -86,11 +86,13 @@ ErrorBudget budget_of_contact(const BudgetCommand& command, const LawFile& law) 
   return contact_budget(law, recordings.front(), options);
 }
 
-/// A plan whose tolerance is the data uncertainty; without a folder, the command that writes one.
-std::string next_of_budget(const BudgetCommand& command) {
-  if (command.folder.empty()) return "the same with --folder budget";
+/// A plan whose tolerance is the data uncertainty, of a scene that comes with tpm where none was
+/// given; without a folder, the command that writes one.
+std::string next_of_budget(const BudgetCommand& command, const Session& session) {
+  if (command.folder.empty()) return same_command(session, "--folder budget");
+  constexpr const char* kShipped = "configs/plan/servo.json";
   return fmt::format("tpm plan {} --tolerance data --budget-file {}",
-                     command.scene.empty() ? std::string("SCENE.json") : shell_word(command.scene),
+                     shell_word(command.scene.empty() ? kShipped : command.scene),
                      shell_word((std::filesystem::path(command.folder) / "budget.json").string()));
 }
 
@@ -105,14 +107,14 @@ int run_budget(const BudgetCommand& command, const Session& session) {
   std::string text;
   if (session.json()) {
     Json json = to_json(budget);
-    add_end(json, command.folder, files, next_of_budget(command));
+    add_end(json, command.folder, files, next_of_budget(command, session));
     text = answer_text(session, std::move(json));
   } else if (command.verbose) {
     text = to_terminal_text(budget);
     if (!files.empty()) text += written(session, command.folder, files);
   } else {
     ShortAnswer answer = short_answer(budget);
-    end_answer(answer, command.folder, files, next_of_budget(command));
+    end_answer(answer, command.folder, files, next_of_budget(command, session));
     text = to_text(answer);
   }
   deliver(text, command.output);

@@ -7,6 +7,7 @@
 #include "answer.hpp"
 #include "command.hpp"
 #include "data_text.hpp"
+#include "tpm/base/text.hpp"
 #include "tpm/files/import/description.hpp"
 #include "tpm/files/import/pack.hpp"
 #include "tpm/files/json.hpp"
@@ -32,18 +33,22 @@ std::vector<Curve> load_all(const std::string& argument) {
 
 int list(const Session& session) {
   const auto curves = list_curves();
+  const std::string next =
+      curves.empty() ? std::string() : "tpm data show " + shell_word(curves.front().id);
   if (session.json()) {
     const auto words = [](const CurveSummary& c) {
       return Json{{"id", c.id}, {"kind", c.kind}, {"rows", c.size}, {"title", c.title}};
     };
-    say("{}", answer_text(session, Json{{"curves", array_json(curves, words)}}));
+    Json json{{"curves", array_json(curves, words)}};
+    add_end(json, {}, {}, next);
+    say("{}", answer_text(session, std::move(json)));
     return 0;
   }
   std::vector<std::vector<std::string>> table{{"id", "kind", "rows", "title"}};
   for (const CurveSummary& curve : curves) {
     table.push_back({curve.id, curve.kind, std::to_string(curve.size), curve.title});
   }
-  say("{}", aligned(table));
+  say("{}{}", aligned(table), next_line(next));
   return 0;
 }
 
@@ -107,10 +112,13 @@ int pack(const Session& session, const std::vector<std::string>& arguments,
     for (Curve& curve : load_all(argument)) curves.push_back(std::move(curve));
   }
   pack_curves(output, curves);
+  const std::string next = "tpm data show " + shell_word(output);
   if (session.json()) {
-    say("{}", answer_text(session, Json{{"file", output}, {"curves", curves.size()}}));
+    Json json{{"file", output}, {"curves", curves.size()}};
+    add_end(json, {}, {output}, next);
+    say("{}", answer_text(session, std::move(json)));
   } else {
-    say("{}: {} curves\n", output, curves.size());
+    say("{}: {} curves\n{}", output, curves.size(), next_line(next));
   }
   return 0;
 }
@@ -173,7 +181,7 @@ void add_pack(CLI::App& data, Session& session) {
   add_format_option(*command, session);
   command->footer(
       "Example:\n  tpm data pack evren_relaxation evren_static -o curves.h5\n"
-      "JSON: file, curves (how many)");
+      "JSON: file, curves (how many), files, next");
   set_run(*command, session, [&session, options] {
     return pack(session, options->curves, options->output, options->force);
   });

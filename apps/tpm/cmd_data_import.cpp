@@ -2,6 +2,7 @@
 // project's form.
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <filesystem>
 #include <memory>
 #include <set>
@@ -11,6 +12,7 @@
 #include "common_options.hpp"
 #include "option_kinds.hpp"
 #include "recording_options.hpp"
+#include "tpm/base/text.hpp"
 #include "tpm/files/file.hpp"
 #include "tpm/files/file_roles.hpp"
 #include "tpm/files/import/import.hpp"
@@ -167,7 +169,20 @@ void require_free(const std::vector<Target>& targets) {
   }
 }
 
-void print_text(const std::vector<Target>& targets, bool written) {
+/// A fit of the first recording or spectrum; of other curves the curve. The command that writes
+/// them, if nothing was written.
+std::string next_of_import(const std::vector<Target>& targets, bool written,
+                           const Session& session) {
+  if (!written) return same_command(session, "--folder imported");
+  const auto fitted = std::ranges::find_if(targets, [](const Target& target) {
+    const std::string& kind = target.curve.description.kind;
+    return kind == "recording" || kind == "spectrum";
+  });
+  return fitted != targets.end() ? "tpm fit " + shell_word(fitted->csv.string())
+                                 : "tpm data show " + shell_word(targets.front().csv.string());
+}
+
+void print_text(const std::vector<Target>& targets, bool written, const std::string& next) {
   for (const Target& target : targets) {
     say("{} -> {}\n", target.source,
         written ? target.csv.string() : "nothing written: no --output or --folder");
@@ -175,9 +190,11 @@ void print_text(const std::vector<Target>& targets, bool written) {
       say("  {}: {}\n", finding.what, finding.value);
     }
   }
+  say("{}", next_line(next));
 }
 
-void print_json(const Session& session, const std::vector<Target>& targets, bool written) {
+void print_json(const Session& session, const std::vector<Target>& targets, bool written,
+                const std::string& next) {
   const Json report = array_json(targets, [&](const Target& target) {
     Json understood = Json::object();
     for (const ImportFinding& finding : target.curve.findings)
@@ -187,7 +204,15 @@ void print_json(const Session& session, const std::vector<Target>& targets, bool
                 {"id", target.curve.description.header.id},
                 {"understood", understood}};
   });
-  say("{}", answer_text(session, Json{{"curves", report}}));
+  std::vector<std::string> files;
+  for (const Target& target : targets) {
+    if (!written) break;
+    files.push_back(target.csv.string());
+    files.push_back(fs::path(target.csv).replace_extension(".json").string());
+  }
+  Json json{{"curves", report}};
+  add_end(json, {}, files, next);
+  say("{}", answer_text(session, std::move(json)));
 }
 
 void write_curves(const std::vector<Target>& targets) {
@@ -209,7 +234,8 @@ int import_files(const Session& session, const ImportArguments& arguments) {
   }
   if (write && !arguments.force) require_free(targets);
   if (write) write_curves(targets);
-  session.json() ? print_json(session, targets, write) : print_text(targets, write);
+  const std::string next = next_of_import(targets, write, session);
+  session.json() ? print_json(session, targets, write, next) : print_text(targets, write, next);
   return 0;
 }
 
@@ -287,7 +313,7 @@ void add_data_import_command(CLI::App& data, Session& session) {
       "--probe-shape sphere \\\n"
       "      --probe-diameter \"10 um\"\n"
       "JSON: curves, objects with source, csv (null if not written), id and understood\n"
-      "(what was found in the file)");
+      "(what was found in the file); files, next");
   set_run(*command, session, [&session, arguments] { return import_files(session, *arguments); });
 }
 

@@ -1,6 +1,7 @@
 // tpm design: experiments to choose from, and what simulated data say of intervals and laws.
 #include <fmt/format.h>
 
+#include <filesystem>
 #include <memory>
 #include <optional>
 #include <string>
@@ -10,6 +11,7 @@
 #include "common_options.hpp"
 #include "design_options.hpp"
 #include "recording_options.hpp"
+#include "tpm/base/text.hpp"
 #include "tpm/files/json.hpp"
 #include "tpm/fit/design/design.hpp"
 #include "tpm/fit/show/design_figures.hpp"
@@ -39,17 +41,23 @@ int rank_candidates(const DesignOptions& options, const Session& session) {
   if (!options.folder.empty()) files = write_figures(options.folder, design_figures(result));
   Json json = to_json(result, checked, top);
   const std::string csv_text = json_table_csv(json.at("ranked"), "/expected/parameters");
-  constexpr const char* kNext = "tpm fit RECORDING.csv";
+  // The page of the figures, or what draws them.
+  const std::string next =
+      options.folder.empty()
+          ? same_command(session, "--folder design")
+          : fmt::format(
+                "tpm view {}",
+                shell_word((std::filesystem::path(options.folder) / "figures.json").string()));
   std::string text;
   if (session.json()) {
-    add_end(json, options.folder, files, kNext);
+    add_end(json, options.folder, files, next);
     text = answer_text(session, std::move(json));
   } else if (options.verbose) {
     text = to_terminal_text(result, checked, top);
     if (!files.empty()) text += written(session, options.folder, files);
   } else {
     ShortAnswer answer = short_answer(result, checked, top);
-    end_answer(answer, options.folder, files, kNext);
+    end_answer(answer, options.folder, files, next);
     text = to_text(answer);
   }
   deliver(text, options.output);

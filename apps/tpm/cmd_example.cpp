@@ -116,6 +116,7 @@ std::string next_command(const Example& example, const fs::path& folder) {
 }
 
 int list_examples(const Session& session) {
+  const std::string next = fmt::format("tpm example {}", examples().front().name);
   if (session.json()) {
     Json all = Json::array();
     for (const Example& e : examples()) {
@@ -127,7 +128,9 @@ int list_examples(const Session& session) {
     }
     Json real = Json::array();
     for (const RealRecording& r : kReal) real.push_back({{"about", r.about}, {"source", r.source}});
-    say("{}", answer_text(session, Json{{"examples", all}, {"real_recordings", real}}));
+    Json json{{"examples", all}, {"real_recordings", real}};
+    add_end(json, {}, {}, next);
+    say("{}", answer_text(session, std::move(json)));
     return 0;
   }
   std::vector<std::vector<std::string>> table{{"name", "for", "provenance", "what"}};
@@ -138,7 +141,7 @@ int list_examples(const Session& session) {
   std::string text = aligned(table);
   text += "\nReal recordings do not come with tpm. Published ones:\n";
   for (const RealRecording& r : kReal) text += fmt::format("  {}: {}\n", r.about, r.source);
-  say("{}\nnext: tpm example {}\n", text, examples().front().name);
+  say("{}\n{}", text, next_line(next));
   return 0;
 }
 

@@ -314,7 +314,7 @@ int run_hil(const RunChoice& choice, const Session& session) {
     say("{}", answer_text(session, std::move(json)));
   } else {
     say("{}wrote {}\n", run_text(hil, run), choice.output);
-    if (!next.empty()) say("next: {}\n", next);
+    say("{}", next_line(next));
   }
   for (const Remark& remark : run.rendering.remarks) {
     tell_user("tpm: warning: {}\n", remark.text);

@@ -74,22 +74,6 @@ JitterCheck checked_hil(const HilSession& hil, const CheckChoice& choice,
   return check;
 }
 
-/// The options that name the device, as they were given.
-std::string device_arguments(const DeviceOptions& device) {
-  std::string text;
-  const auto add = [&](const char* option, const std::string& value) {
-    if (!value.empty()) text += fmt::format(" {} {}", option, shell_word(value));
-  };
-  if (device.choice.kind != "virtual") add("--device", device.choice.kind);
-  add("--serial", device.serial);
-  if (device.index >= 0) add("--index", std::to_string(device.index));
-  add("--dhd-library", device.library);
-  add("--plugin", device.plugin);
-  add("--device-recording", device.replay);
-  add("--device-file", device.file);
-  return text;
-}
-
 /// The session that was asked; without one, the device's delay, or the session that comes with tpm.
 /// None where a session would not begin.
 std::string next_of_check(const JitterCheck& check, const CheckChoice& choice) {
@@ -133,8 +117,13 @@ int check_hil(const CheckChoice& choice, const Session& session) {
   }
   std::vector<Verdict> verdicts{{"rate_kept", check.timing_kept}};
   if (check.session) verdicts.push_back({"session_accepted", check.session->accepted});
-  say("{}", session.json() ? answer_text(session, check_json(check), verdicts)
-                           : checked_text(check, choice));
+  if (session.json()) {
+    Json json = check_json(check);
+    add_end(json, {}, {}, next_of_check(check, choice));
+    say("{}", answer_text(session, std::move(json), verdicts));
+  } else {
+    say("{}", checked_text(check, choice));
+  }
   if (check.outcome.cause == StopCause::signal) return InterruptWatch::exit_code();
   return exit_code(check.timing_kept && (!check.session || check.session->accepted));
 }

@@ -1,6 +1,7 @@
 // tpm hil export: a recording for other programs.
 
 #include <memory>
+#include <utility>
 
 #include "answer.hpp"
 #include "command.hpp"
@@ -21,15 +22,15 @@ int export_hil(const ExportChoice& choice, const Session& session) {
   const HilRecording recording = read_recording(choice.recording);
   export_recording(recording, sha256_hex(read_file(choice.recording)), choice.output);
   if (session.json()) {
-    say("{}", answer_text(session,
-                          Json{{"file", choice.output},
-                               {"rows", recording.rows.size()},
-                               {"whole", recording.whole()},
-                               {"damaged_rows", recording.damaged},
-                               {"cause", recording.cause()},
-                               {"remarks", remarks_json(recording_remarks(recording))},
-                               {"simulated_device", recording.simulated()}},
-                          {{"recording_whole", recording.whole()}}));
+    Json json{{"file", choice.output},
+              {"rows", recording.rows.size()},
+              {"whole", recording.whole()},
+              {"damaged_rows", recording.damaged},
+              {"cause", recording.cause()},
+              {"remarks", remarks_json(recording_remarks(recording))},
+              {"simulated_device", recording.simulated()}};
+    add_end(json, {}, {choice.output}, {});
+    say("{}", answer_text(session, std::move(json), {{"recording_whole", recording.whole()}}));
   } else {
     std::string text = device_line(recording) + "\n";
     for (const Remark& remark : recording_remarks(recording)) text += remark.text + "\n";

@@ -106,6 +106,16 @@ class StartWords {
   std::uint32_t missing_ = 0;
 };
 
+/// A session with the delay that was found; none where none was.
+std::string next_of_identification(const IdentifyRun& run, const IdentifyChoice& choice) {
+  if (!run.counts || !run.found.delay_mean_s || !run.ended_by.empty()) return {};
+  DeviceOptions device = choice.device;
+  device.file = choice.output;
+  return fmt::format("tpm hil run {}{} -o session.tpmrec",
+                     shell_word(choice.session.empty() ? "configs/hil_liver.json" : choice.session),
+                     device_arguments(device));
+}
+
 int identify_hil(const IdentifyChoice& choice, const Session& session) {
   constexpr double kSlowest_Hz = 500.0, kFastest_Hz = 4000.0, kLeast_s = 5.0, kMost_s = 600.0;
   require_new(choice.output, session);
@@ -145,12 +155,18 @@ int identify_hil(const IdentifyChoice& choice, const Session& session) {
     return InterruptWatch::exit_code();
   }
   const IdentifyRun& run = *measured;
-  const Json json = device_file_json(run, hardware ? utc_now() : std::string());
+  Json json = device_file_json(run, hardware ? utc_now() : std::string());
   if (run.counts) write_file(choice.output, to_text(json));
+  const std::string next = next_of_identification(run, choice);
+  std::vector<std::string> files;
+  if (run.counts) files = {choice.output};
   if (session.json()) {
-    say("{}", answer_text(session, json, {{"delay_found", run.found.delay_mean_s.has_value()}}));
+    add_end(json, {}, files, next);
+    say("{}", answer_text(session, std::move(json),
+                          {{"delay_found", run.found.delay_mean_s.has_value()}}));
   } else {
-    say("{}{}", identified_text(run), run.counts ? fmt::format("wrote {}\n", choice.output) : "");
+    say("{}{}{}", identified_text(run),
+        run.counts ? fmt::format("wrote {}\n", choice.output) : std::string(), next_line(next));
   }
   if (run.ended_by.empty()) return exit_code(run.found.delay_mean_s.has_value());
   tell_user("tpm: identification ended after {} s of {} s: {}{}\n", significant(run.measured_s, 3),

@@ -44,8 +44,9 @@ IdentifyOptions identify_options(const IdentifyCommand& command, Quantity drive)
 
 /// The law in a session; of a strip the law in another program. Without a folder, the command that
 /// writes one.
-std::string next_of_identify(const IdentifyCommand& command, Quantity drive) {
-  if (command.folder.empty()) return "the same with --folder identified";
+std::string next_of_identify(const IdentifyCommand& command, Quantity drive,
+                             const Session& session) {
+  if (command.folder.empty()) return same_command(session, "--folder identified");
   const std::string law = shell_word((std::filesystem::path(command.folder) / "law.json").string());
   return drive == Quantity::indentation_depth
              ? fmt::format("tpm hil run configs/hil_law.json --law {} -o session.tpmrec", law)
@@ -73,10 +74,10 @@ int run_identify(const IdentifyCommand& command, const Session& session) {
   }
   if (session.json()) {
     Json ended = json;
-    add_end(ended, command.folder, files, next_of_identify(command, drive));
+    add_end(ended, command.folder, files, next_of_identify(command, drive, session));
     text = answer_text(session, std::move(ended));
   } else if (!command.verbose) {
-    end_answer(answer, command.folder, files, next_of_identify(command, drive));
+    end_answer(answer, command.folder, files, next_of_identify(command, drive, session));
     text = to_text(answer);
   } else if (!files.empty()) {
     text += written(session, command.folder, files);

@@ -32,6 +32,8 @@ constexpr std::array<const char*, 16> kExamples{"linear",
                                                 "linear-fkelvin_voigt2",
                                                 "linear-fzener2"};
 
+constexpr const char* kNextOfFamily = "tpm laws linear-1";  // the parameters of one
+
 std::string grammar() {
   return fmt::format(
       "KERNEL[-BRANCHES][-TENSION][-fluid][-series]: kernel linear, hertz or power; branches 1 to "
@@ -81,7 +83,7 @@ std::string family_text() {
   for (const char* name : kExamples) {
     text += fmt::format("{:<22} {}\n", name, law_words(parse_law_name(name, "laws")));
   }
-  return text + "\nParameters of one: tpm laws NAME\n";
+  return text + "\n" + next_line(kNextOfFamily);
 }
 
 std::string answer(const std::string& name, const Session& session) {
@@ -91,7 +93,9 @@ std::string answer(const std::string& name, const Session& session) {
   }
   if (!session.json()) return family_text();
   const auto law = [](const char* text) { return law_json(parse_law_name(text, "laws"), false); };
-  return answer_text(session, Json{{"names", grammar()}, {"laws", array_json(kExamples, law)}});
+  Json json{{"names", grammar()}, {"laws", array_json(kExamples, law)}};
+  add_end(json, {}, {}, kNextOfFamily);
+  return answer_text(session, std::move(json));
 }
 
 }  // namespace

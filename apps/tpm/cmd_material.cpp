@@ -9,6 +9,7 @@
 #include "protocol_options.hpp"
 #include "recording_options.hpp"
 #include "tpm/base/lists.hpp"
+#include "tpm/base/text.hpp"
 #include "tpm/files/json.hpp"
 #include "tpm/fit/predict/organ_material.hpp"
 #include "tpm/fit/sample_digest.hpp"
@@ -69,6 +70,19 @@ std::vector<MaterialMotion> chosen_motions(const MaterialCommand& command, const
   });
 }
 
+/// The session that was written, or the scene where the loop cannot have its bonds; without a
+/// folder, the command that writes them.
+std::string next_of_material(const MaterialCommand& command, const Session& session) {
+  if (command.folder.empty()) return same_command(session, "--folder on_organ");
+  const std::filesystem::path folder = command.folder;
+  if (command.stiffening == "all") {
+    return fmt::format("tpm predict {} --depth '2 mm' --rate '2 mm/s' --hold '3 s'",
+                       shell_word((folder / "scene.json").string()));
+  }
+  return fmt::format("tpm hil run {} -o {}", shell_word((folder / "session.json").string()),
+                     shell_word((folder / "session.tpmrec").string()));
+}
+
 int run_material(const MaterialCommand& command, const Session& session) {
   will_write_into(command.folder, {"scene.json", "session.json", "material.json", "material.csv",
                                    "figures.json", "material.svg", "material.png", "material.pdf"});
@@ -86,16 +100,17 @@ int run_material(const MaterialCommand& command, const Session& session) {
   if (!command.output.empty()) deliver(to_text(result.scene), command.output);
   std::vector<std::string> files;
   if (!command.folder.empty()) files = write_organ_material_report(command.folder, result);
+  const std::string next = next_of_material(command, session);
   if (session.json()) {
     Json json = to_json(result);
-    add_end(json, command.folder, files, {});
+    add_end(json, command.folder, files, next);
     if (!command.output.empty()) json["files"].push_back(command.output);
     write_output(answer_text(session, std::move(json)));
     return 0;
   }
   std::string text = to_terminal_text(result);
   if (!files.empty()) text += written(session, command.folder, files);
-  write_output(text);
+  write_output(text + next_line(next));
   return 0;
 }
 

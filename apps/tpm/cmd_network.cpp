@@ -1,5 +1,7 @@
 // tpm network: build, check and show the network of spheres that a scene describes.
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <filesystem>
 #include <memory>
@@ -55,18 +57,35 @@ Tissue tissue_of(const NetworkChoice& choice) {
   return read_tissue(choice.scene);
 }
 
+/// `tpm network ABOUT` of the same organ.
+std::string command_of_organ(const char* about, const NetworkChoice& choice) {
+  std::string command = fmt::format("tpm network {}", about);
+  if (!choice.scene.empty()) command += " " + shell_word(choice.scene);
+  const auto add = [&](const char* option, const std::string& value) {
+    if (!value.empty()) command += fmt::format(" {} {}", option, shell_quoted(value));
+  };
+  add("--spheres", choice.count);
+  add("--layers", choice.layers);
+  add("--spacing", choice.spacing);
+  add("--filling", choice.filling);
+  add("--seed", choice.seed);
+  return command;
+}
+
 int build(const NetworkChoice& choice, const Session& session) {
   will_write({fs::path(choice.output).replace_extension(".xdmf")});
   const Tissue tissue = tissue_of(choice);
   require_sound(tissue, choice.scene.empty() ? "options" : choice.scene);
   const fs::path xdmf = write_network(tissue, choice.output);
   const NetworkInspection inspection = inspect(tissue);
+  const std::string next = command_of_organ("check", choice);
   if (session.json()) {
     Json json = network_json(tissue, inspection);
-    json["files"] = {choice.output, xdmf.string()};
+    add_end(json, {}, {choice.output, xdmf.string()}, next);
     say("{}", answer_text(session, json));
   } else {
-    say("{}wrote {} and {}\n", network_text(tissue, inspection), choice.output, xdmf.string());
+    say("{}wrote {} and {}\n{}", network_text(tissue, inspection), choice.output, xdmf.string(),
+        next_line(next));
   }
   return 0;
 }
@@ -90,6 +109,7 @@ int check(const NetworkChoice& choice, const Session& session) {
   const std::vector<double> support =
       local_support(tissue.bonds(), tissue.network.organ, tissue.constraints());
   const auto least = std::min_element(support.begin(), support.end());
+  const std::string next = fault.empty() ? command_of_organ("show", choice) : std::string();
   if (session.json()) {
     Json json = network_json(tissue, inspection);
     json["least_support"] = rounded(*least, 6);
@@ -97,6 +117,7 @@ int check(const NetworkChoice& choice, const Session& session) {
     json["stands"] = fault.empty();
     json["fault"] = fault.empty() ? Json(nullptr) : Json(fault);
     json["modes_counted"] = tissue.network.organ.size() <= kMostSpheresForModes;
+    add_end(json, {}, {}, next);
     say("{}", answer_text(session, json, {{"network_stands", fault.empty()}}));
   } else {
     say("{}least support: {} at sphere {} (loose below {})\n", network_text(tissue, inspection),
@@ -107,6 +128,7 @@ int check(const NetworkChoice& choice, const Session& session) {
               ? ", no motion is free of energy"
               : "; motions of the whole were not looked for, there are too many spheres");
     }
+    say("{}", next_line(next));
   }
   if (!fault.empty()) tell_user("tpm: {}\n", fault);
   return exit_code(fault.empty());

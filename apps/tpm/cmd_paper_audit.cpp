@@ -37,7 +37,8 @@ int run_command(const Session& session, const AuditOptions& options) {
       options.claims.empty() ? paper_claims_path() : std::filesystem::path(options.claims);
   const auto csv = csv_beside(options.output, session);
   const AuditReport report = run_audit(read_json(path), path.filename().string());
-  const Json json = to_json(report);
+  Json json = to_json(report);
+  add_end(json, {}, {}, next_of_audit(options));
   deliver(session.json() ? answer_text(session, json) : audit_answer(report, options),
           options.output);
   deliver_csv(json_table_csv(json.at("findings"), "/details"), csv);

@@ -36,14 +36,21 @@ int experiments(const ExperimentsOptions& options, const Session& session) {
   const OrganStudy study = run_organ_study(config);
   const std::chrono::duration<double> took = std::chrono::steady_clock::now() - start;
   write_organ_study(study, options.folder, python, took.count());
+  const std::vector<std::string> files{"report.html",
+                                       "report.md",
+                                       "experiments.json",
+                                       "readings.csv",
+                                       "fits.csv",
+                                       "curves.csv",
+                                       python.empty() ? "figures.json" : "figures"};
   if (session.json()) {
-    say("{}", answer_text(session, to_json(study)));
+    Json json = to_json(study);
+    add_end(json, options.folder, files, {});
+    say("{}", answer_text(session, std::move(json)));
     return 0;
   }
   for (const std::string& sentence : cost_sentences(study)) say("- {}\n", sentence);
-  say("written to {}: report.html, report.md, experiments.json, readings.csv, fits.csv, "
-      "curves.csv, {}\n",
-      options.folder, python.empty() ? "figures.json" : "figures");
+  say("written to {}: {}\n", options.folder, fmt::join(files, ", "));
   return 0;
 }
 

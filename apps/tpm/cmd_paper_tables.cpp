@@ -85,17 +85,25 @@ void warn_of_depths(const TableRequest& request) {
             significant(1e3 * deepest_m, 4));
 }
 
+constexpr const char* kNextOfTables = "tpm paper audit";
+
 std::string short_text(const TablesResult& result) {
   ShortAnswer answer = short_answer(result);
-  end_answer(answer, "", {}, "tpm paper audit");
+  end_answer(answer, "", {}, kNextOfTables);
   return to_text(answer);
+}
+
+std::string json_text(const TablesResult& result, const Session& session) {
+  Json json = to_json(result);
+  add_end(json, {}, {}, kNextOfTables);
+  return answer_text(session, std::move(json));
 }
 
 std::string rendered(const TablesResult& result, const TableOptions& options,
                      const Session& session) {
   const std::string& format = options.format;
   if (format == "text" && !options.verbose) return short_text(result);
-  if (format == "json") return answer_text(session, to_json(result));
+  if (format == "json") return json_text(result, session);
   if (format == "csv") return tables_csv(result);
   const TableStyle style = format == "md"      ? TableStyle::markdown
                            : format == "latex" ? TableStyle::latex

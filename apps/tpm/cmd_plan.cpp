@@ -146,8 +146,9 @@ int calibrate(const PlanCommand& command, const Session& session) {
     seconds[std::string(entry.text)] = costs.seconds[static_cast<std::size_t>(entry.meaning)];
   }
   if (session.json()) {
-    say("{}",
-        answer_text(session, Json{{"seconds_per_operation", seconds}, {"file", file.string()}}));
+    Json json{{"seconds_per_operation", seconds}, {"file", file.string()}};
+    add_end(json, {}, {file.string()}, {});
+    say("{}", answer_text(session, std::move(json)));
     return 0;
   }
   for (const auto& [name, value] : seconds.items()) {
@@ -196,10 +197,10 @@ PlannedScene planned_scene(const PlanCommand& command) {
 }
 
 /// Runs the pick; where none meets the budget, the scene is planned without it.
-std::string next_of_plan(const PlanCommand& command, const Plan& plan) {
+std::string next_of_plan(const PlanCommand& command, const Plan& plan, const Session& session) {
   const PlanChoice& choice = command.choice;
   if (!command.spheres.empty() && command.scene_output.empty()) {
-    return "the same with --write-scene planned.json";
+    return same_command(session, "--write-scene planned.json");
   }
   const std::string scene =
       shell_word(command.spheres.empty() ? command.scene : command.scene_output);
@@ -226,8 +227,8 @@ std::vector<std::string> written_scenes(const PlanCommand& command, const Planne
 }
 
 /// The answer, with the number of spheres before it if that was asked for.
-std::string answer_of_plan(const PlanCommand& command, const PlannedScene& chosen,
-                           const Plan& plan) {
+std::string answer_of_plan(const PlanCommand& command, const PlannedScene& chosen, const Plan& plan,
+                           const Session& session) {
   if (command.verbose) {
     return (chosen.spheres ? spheres_text(*chosen.spheres) : std::string()) + plan_text(plan);
   }
@@ -238,7 +239,7 @@ std::string answer_of_plan(const PlanCommand& command, const PlannedScene& chose
   for (const std::string& file : written_scenes(command, chosen)) {
     answer.end.push_back("wrote " + file);
   }
-  end_answer(answer, "", {}, next_of_plan(command, plan));
+  end_answer(answer, "", {}, next_of_plan(command, plan, session));
   return to_text(answer);
 }
 
@@ -253,7 +254,8 @@ int run_plan(const PlanCommand& command, const Session& session) {
   request.thorough = command.thorough;
   const PlannedScene chosen = planned_scene(command);
   if (!chosen.scene) {
-    const Json json{{"spheres_choice", spheres_json(*chosen.spheres)}};
+    Json json{{"spheres_choice", spheres_json(*chosen.spheres)}};
+    add_end(json, {}, {}, {});
     deliver(session.json() ? answer_text(session, json, {{"number_found", false}})
                            : spheres_text(*chosen.spheres),
             command.output);
@@ -261,17 +263,20 @@ int run_plan(const PlanCommand& command, const Session& session) {
   }
   if (command.estimate) {
     const ExpectedPlanWork work = expected_work(*chosen.scene, request);
-    deliver(
-        session.json() ? answer_text(session, expected_plan_json(work)) : expected_plan_text(work),
-        command.output);
+    const std::string next = same_command(session, {}, "--estimate");
+    Json json = expected_plan_json(work);
+    add_end(json, {}, {}, next);
+    deliver(session.json() ? answer_text(session, std::move(json))
+                           : expected_plan_text(work) + next_line(next),
+            command.output);
     return 0;
   }
   const Plan plan = planned(*chosen.scene, std::move(request));
   Json json = plan_json(plan);
   if (chosen.spheres) json["spheres_choice"] = spheres_json(*chosen.spheres);
-  add_end(json, {}, written_scenes(command, chosen), next_of_plan(command, plan));
+  add_end(json, {}, written_scenes(command, chosen), next_of_plan(command, plan, session));
   deliver(session.json() ? answer_text(session, json, {{"model_found", plan.choice.has_value()}})
-                         : answer_of_plan(command, chosen, plan),
+                         : answer_of_plan(command, chosen, plan, session),
           command.output);
   deliver_csv(json_table_csv(json.at("frontier")), csv);
   return exit_code(plan.choice.has_value());

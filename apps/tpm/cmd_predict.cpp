@@ -4,7 +4,9 @@
 
 #include <memory>
 #include <optional>
+#include <string>
 #include <utility>
+#include <vector>
 
 #include "answer.hpp"
 #include "command.hpp"
@@ -119,13 +121,21 @@ int predict(const PredictOptions& options, const Session& session) {
   }
   const LawPrediction prediction = answer_of(options.law, file, recording, chosen);
   const Json json = to_json(prediction);
-  std::string text = session.json() ? "" : to_terminal_text(prediction);
-  if (session.json()) text = answer_text(session, json);
+  const std::string next = next_of_prediction(options, prediction);
+  std::vector<std::string> files;
   if (!options.folder.empty()) {
-    text +=
-        written(session, options.folder, write_prediction_report(options.folder, prediction, json));
+    files = write_prediction_report(options.folder, prediction, json);
   }
-  if (!session.json()) text += fmt::format("next: {}\n", next_of_prediction(options, prediction));
+  std::string text;
+  if (session.json()) {
+    Json ended = json;
+    add_end(ended, options.folder, files, next);
+    text = answer_text(session, std::move(ended));
+  } else {
+    text = to_terminal_text(prediction);
+    if (!files.empty()) text += written(session, options.folder, files);
+    text += next_line(next);
+  }
   deliver(text, options.output);
   deliver_csv(to_csv(prediction), csv);
   return 0;

@@ -15,6 +15,7 @@
 #include "tpm/files/file_roles.hpp"
 #include "tpm/show/run_record.hpp"
 #include "tpm/sweep/sweep_ranks.hpp"
+#include "tpm/sweep/sweep_reader.hpp"
 #include "tpm/sweep/sweep_result.hpp"
 #include "tpm/work/progress.hpp"
 #include "tpmkit/error.hpp"
@@ -122,9 +123,10 @@ std::string next_of_sweep(const CellTally& tally, const std::string& file) {
                         : fmt::format("tpm sweep show {}", shell_word(file));
 }
 
+/// @param files  that were written: none if the results stood there already
 /// @returns the exit code: a sweep of which no cell has an answer has none either
-int print_results(const Sweep& sweep, const CellTally& tally, const std::vector<std::string>& files,
-                  const Session& session) {
+int print_results(const Sweep& sweep, const CellTally& tally, const fs::path& output,
+                  const std::vector<std::string>& files, const Session& session) {
   std::string text = fmt::format("{} cells: {} done, {} skipped, {} failed\n", sweep.cells(),
                                  tally.done, tally.skipped, tally.failed);
   constexpr std::size_t kShown = 5;
@@ -135,7 +137,7 @@ int print_results(const Sweep& sweep, const CellTally& tally, const std::vector<
     text += fmt::format("- and {} more reasons: /reasons\n", tally.reasons.size() - kShown);
   }
   say_with_files(session, tally_json(sweep, tally), text, files,
-                 next_of_sweep(tally, files.front()));
+                 next_of_sweep(tally, output.string()));
   return exit_code(tally.done > 0 || tally.failed == 0);
 }
 
@@ -196,6 +198,14 @@ void require_same_count(const fs::path& output, const Shard& shard) {
   }
 }
 
+/// The next shard, or their merging.
+std::string next_of_shard(const Shard& shard, const std::string& sweep_file,
+                          const fs::path& output) {
+  const std::string words = shell_word(sweep_file), into = shell_word(output.string());
+  if (shard.index + 1 == shard.count) return fmt::format("tpm sweep merge {} -o {}", words, into);
+  return fmt::format("tpm sweep {} --shard {}/{} -o {}", words, shard.index + 2, shard.count, into);
+}
+
 int run_shard(const Sweep& sweep, const std::string& sweep_file, const fs::path& output,
               SweepControls controls, const Session& session) {
   require_same_count(output, controls.shard);
@@ -207,15 +217,14 @@ int run_shard(const Sweep& sweep, const std::string& sweep_file, const fs::path&
   if (run.interrupted) return stopped(log);
   log.sync();
   write_file(file.string() + ".run.json", to_text(sidecar(sweep, run, {})));
+  const std::string next = next_of_shard(shard, sweep_file, output);
   if (session.json()) {
-    say("{}", answer_text(session, Json{{"file", file.string()}, {"blocks", run.blocks}}));
+    Json json{{"file", file.string()}, {"blocks", run.blocks}};
+    add_end(json, {}, {file.string(), file.string() + ".run.json"}, next);
+    say("{}", answer_text(session, std::move(json)));
   } else {
-    const std::string words = shell_word(sweep_file), into = shell_word(output.string());
-    say("shard {} of {}: {} of {} blocks in {}\nnext: {}\n", shard.index + 1, shard.count,
-        run.blocks, sweep.blocks(), file.string(),
-        shard.index + 1 == shard.count ? fmt::format("tpm sweep merge {} -o {}", words, into)
-                                       : fmt::format("tpm sweep {} --shard {}/{} -o {}", words,
-                                                     shard.index + 2, shard.count, into));
+    say("shard {} of {}: {} of {} blocks in {}\n{}", shard.index + 1, shard.count, run.blocks,
+        sweep.blocks(), file.string(), next_line(next));
   }
   return 0;
 }
@@ -264,7 +273,7 @@ int merge(const SweepChoice& choice, const Session& session) {
                     "all shards, each run to its end");
   }
   const WrittenSweep written = write_results(sweep, run, all, output);
-  return print_results(sweep, written.tally, written.files, session);
+  return print_results(sweep, written.tally, output, written.files, session);
 }
 
 int run_command(const SweepChoice& choice, const Session& session) {
@@ -286,7 +295,7 @@ int run_command(const SweepChoice& choice, const Session& session) {
   if (choice.shard.empty() && !fs::exists(log_file)) {
     if (fingerprint_of(output) == sweep.fingerprint) {
       tell_user("tpm: {} holds this sweep already\n", output.string());
-      return 0;
+      return print_results(sweep, SweepReader(output).tally(), output, {}, session);
     }
   }
   require_replaceable(output);
@@ -309,7 +318,7 @@ int run_command(const SweepChoice& choice, const Session& session) {
   if (run.interrupted) return stopped(log);
   const WrittenSweep written = write_results(sweep, run, {&log}, output, workers);
   fs::remove(log_file);
-  return print_results(sweep, written.tally, written.files, session);
+  return print_results(sweep, written.tally, output, written.files, session);
 }
 
 }  // namespace

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 #include <filesystem>
+#include <functional>
 #include <memory>
 
 #include "answer.hpp"
@@ -34,7 +35,12 @@ struct SweepViewChoice {
 
 int show(const SweepViewChoice& choice, const Session& session) {
   const SweepReader sweep(choice.file);
-  say("{}", session.json() ? answer_text(session, sweep_json(sweep)) : sweep_text(sweep));
+  const std::string next =
+      sweep.tally().done > 0 ? "tpm sweep plot " + shell_word(choice.file) : std::string();
+  Json json = sweep_json(sweep);
+  add_end(json, {}, {}, next);
+  say("{}",
+      session.json() ? answer_text(session, std::move(json)) : sweep_text(sweep) + next_line(next));
   return 0;
 }
 
@@ -66,11 +72,26 @@ std::pair<std::string, std::uint64_t> parse_fixed(const std::string& text,
   return {name, static_cast<std::uint64_t>(nearest - axis.places.begin())};
 }
 
-/// Pictures beside what is printed, if a folder was named.
-void draw_into(const std::string& folder, const std::vector<Figure>& figures) {
-  if (folder.empty()) return;
-  const auto files = write_figures(folder, figures);
-  tell_user("tpm: wrote {} into {}\n", fmt::join(files, ", "), folder);
+/// The page of figures that were drawn into a folder.
+std::string next_of_pictures(const std::string& folder) {
+  return "tpm view " + shell_word((fs::path(folder) / "figures.json").string());
+}
+
+/// Prints an answer; pictures beside it, if a folder was named, else the command that draws them.
+void say_and_draw(const std::string& folder, const std::function<std::vector<Figure>()>& figures,
+                  Json json, std::string text, const std::vector<Verdict>& verdicts,
+                  const Session& session) {
+  std::vector<std::string> files;
+  if (!folder.empty()) files = write_figures(folder, figures());
+  const std::string next =
+      folder.empty() ? same_command(session, "--folder figures") : next_of_pictures(folder);
+  if (session.json()) {
+    add_end(json, folder, files, next);
+    say("{}", answer_text(session, std::move(json), verdicts));
+    return;
+  }
+  if (!files.empty()) text += written(session, folder, files);
+  say("{}{}", text, next_line(next));
 }
 
 int sensitivity(const SweepViewChoice& choice, const Session& session) {
@@ -85,8 +106,9 @@ int sensitivity(const SweepViewChoice& choice, const Session& session) {
     if (wished) all.push_back(sensitivity_of(sweep, v.name, fixed));
   }
   for (const std::string& name : choice.variables) static_cast<void>(sweep.variable(name));
-  say("{}", session.json() ? answer_text(session, sensitivity_json(all)) : sensitivity_text(all));
-  draw_into(choice.figure_folder, sensitivity_figures(all, sweep.title()));
+  say_and_draw(
+      choice.figure_folder, [&] { return sensitivity_figures(all, sweep.title()); },
+      sensitivity_json(all), sensitivity_text(all), {}, session);
   return 0;
 }
 
@@ -106,9 +128,9 @@ int convergence(const SweepViewChoice& choice, const Session& session) {
     return convergence_of(sweep, name, axis, choice.size, fixed);
   });
   const bool monotone = std::ranges::any_of(all, &SweepConvergence::monotone);
-  say("{}", session.json() ? answer_text(session, convergence_json(all), {{"monotone", monotone}})
-                           : convergence_text(all));
-  draw_into(choice.figure_folder, convergence_figures(all, sweep.title()));
+  say_and_draw(
+      choice.figure_folder, [&] { return convergence_figures(all, sweep.title()); },
+      convergence_json(all), convergence_text(all), {{"monotone", monotone}}, session);
   return exit_code(monotone);
 }
 
@@ -137,6 +159,12 @@ int best(const SweepViewChoice& choice, const Session& session) {
     move_scene(fit, choice.fit, choice.start);
     write_file(choice.start, to_text(fit));
   }
+  std::vector<std::string> files;
+  std::string next;
+  if (!choice.start.empty()) {
+    files = {choice.start};
+    next = "tpm fit " + shell_word(choice.start);
+  }
   if (session.json()) {
     Json list = array_json(cells, [&](const BestCell& cell) {
       Json parameters;
@@ -147,7 +175,9 @@ int best(const SweepViewChoice& choice, const Session& session) {
                   {choice.best_output, cell.value},
                   {"parameters", std::move(parameters)}};
     });
-    say("{}", answer_text(session, Json{{"best", std::move(list)}}));
+    Json json{{"best", std::move(list)}};
+    add_end(json, {}, files, next);
+    say("{}", answer_text(session, std::move(json)));
     return 0;
   }
   for (const BestCell& cell : cells) {
@@ -157,7 +187,7 @@ int best(const SweepViewChoice& choice, const Session& session) {
     }
     say("\n");
   }
-  if (!choice.start.empty()) say("wrote {}: tpm fit starts from there\n", choice.start);
+  if (!files.empty()) say("wrote {}\n{}", files.front(), next_line(next));
   return 0;
 }
 
@@ -178,7 +208,8 @@ int plot(const SweepViewChoice& choice, const Session& session) {
     wished.pareto = {choice.pareto.substr(0, comma), choice.pareto.substr(comma + 1)};
   }
   const auto files = write_figures(choice.folder, sweep_figures(sweep, wished));
-  say("wrote {} into {}\n", fmt::join(files, ", "), choice.folder);
+  say("wrote {} into {}\n{}", fmt::join(files, ", "), choice.folder,
+      next_line(next_of_pictures(choice.folder)));
   return 0;
 }
 

@@ -320,9 +320,9 @@ int recheck(const std::string& page, const std::string& output, const Session& s
     Json list = array_json(changes, [](const CredibilityChange& c) {
       return Json{{"place", c.place}, {"before", c.before}, {"now", c.now}};
     });
-    write_output(answer_text(
-        session, Json{{"page", page}, {"marked", marked.string()}, {"changes", std::move(list)}},
-        {{"page_unchanged", changes.empty()}}));
+    Json json{{"page", page}, {"marked", marked.string()}, {"changes", std::move(list)}};
+    add_end(json, {}, {marked.string()}, {});
+    write_output(answer_text(session, std::move(json), {{"page_unchanged", changes.empty()}}));
   } else {
     std::string text = fmt::format("{}: {} of its values changed\n", page, changes.size());
     for (const CredibilityChange& c : changes) {
@@ -333,14 +333,13 @@ int recheck(const std::string& page, const std::string& output, const Session& s
   return exit_code(changes.empty());
 }
 
-/// A recording that was not fitted, a requirement, or where the law or organ is used; if it is not
-/// adequate, a law of these recordings.
+/// A requirement, or where the law or organ is used; if it is not adequate, a law of these
+/// recordings.
 std::string next_of_validation(const ValidateOptions& options, const Validation& validation) {
   const std::string subject = shell_word(options.law);
   const std::string compared = shell_word(options.recordings.files.front());
   switch (validation.verdict) {
-    case ModelVerdict::residual:
-      return fmt::format("tpm validate {} OTHER_RECORDING.csv --require 10%", subject);
+    case ModelVerdict::residual:  // a requirement of these recordings would test nothing
     case ModelVerdict::adequate:
       break;
     default:
@@ -361,7 +360,7 @@ std::string validation_text(const ValidateOptions& options, const Session& sessi
   std::string text = to_terminal_text(validation);
   if (!options.folder.empty()) text += written(session, options.folder, files);
   if (!options.credibility.empty()) text += fmt::format("written: {}\n", options.credibility);
-  return text + fmt::format("next: {}\n", next_of_validation(options, validation));
+  return text + next_line(next_of_validation(options, validation));
 }
 
 std::string validation_json(const ValidateOptions& options, const Session& session,

@@ -97,7 +97,9 @@ int view(const ViewChoice& choice, const Session& session) {
   const std::string html = viewed.html();
   write_file(output, html);
   if (session.json()) {
-    say("{}", answer_text(session, json_of(viewed, output, html.size())));
+    Json json = json_of(viewed, output, html.size());
+    add_end(json, {}, {output.string()}, {});
+    say("{}", answer_text(session, std::move(json)));
     return 0;
   }
   for (std::size_t i = 0; i < viewed.pages.size(); ++i) {

@@ -29,7 +29,8 @@ struct Session {
   bool force = false;           ///< --overwrite: results may be replaced whoever made them
   /// Of the result that --output names: Naming::by_default if the option is missing.
   Naming output_naming = Naming::file;
-  std::function<int()> run;  ///< the chosen command; returns the exit code
+  std::function<int()> run;        ///< the chosen command; returns the exit code
+  std::vector<std::string> words;  ///< of the command line, behind "tpm"
 
   [[nodiscard]] bool json() const { return format == "json"; }
   /// Of files in a folder that --output names.

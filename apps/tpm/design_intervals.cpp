@@ -4,6 +4,7 @@
 
 #include "answer.hpp"
 #include "design_options.hpp"
+#include "tpm/base/text.hpp"
 #include "tpm/fit/coverage.hpp"
 #include "tpm/show/json_table_csv.hpp"
 
@@ -24,12 +25,14 @@ int check_intervals(const DesignOptions& options, const Session& session) {
   const CoverageResult result =
       check_coverage(config, static_cast<int>(parse_whole_number(sets, "--repetitions", 1)),
                      design_seed(options.seed));
-  const Json json = tpm::fit::to_json(result);
+  Json json = tpm::fit::to_json(result);
+  const std::string next = "tpm fit " + shell_word(options.design);
+  add_end(json, {}, {}, next);
   constexpr double kSuspicious = 0.001;
   const bool covered = std::ranges::none_of(
       result.parameters, [](const ParameterCoverage& p) { return p.p_value < kSuspicious; });
   deliver(session.json() ? answer_text(session, json, {{"coverage_as_stated", covered}})
-                         : to_terminal_text(result),
+                         : to_terminal_text(result) + next_line(next),
           options.output);
   deliver_csv(json_table_csv(Json::array({json}), "/parameters"), csv);
   return exit_code(covered);

@@ -162,4 +162,19 @@ RealTimeWish chosen_wish(const DeviceOptions& options) {
   return options.real_time == "enforce" ? RealTimeWish::enforce : RealTimeWish::ignore;
 }
 
+std::string device_arguments(const DeviceOptions& options) {
+  std::string text;
+  const auto add = [&](const char* option, const std::string& value) {
+    if (!value.empty()) text += fmt::format(" {} {}", option, shell_word(value));
+  };
+  if (options.choice.kind != "virtual") add("--device", options.choice.kind);
+  add("--serial", options.serial);
+  if (options.index >= 0) add("--index", std::to_string(options.index));
+  add("--dhd-library", options.library);
+  add("--plugin", options.plugin);
+  add("--device-recording", options.replay);
+  add("--device-file", options.file);
+  return text;
+}
+
 }  // namespace tpm::app

@@ -42,4 +42,7 @@ void warn_of_finding(const DeviceFinding& finding);
 [[nodiscard]] DeviceChoice chosen_device(const DeviceOptions& options);
 [[nodiscard]] RealTimeWish chosen_wish(const DeviceOptions& options);
 
+/// The options that name the device, as they were given: " --device omega7".
+[[nodiscard]] std::string device_arguments(const DeviceOptions& options);
+
 }  // namespace tpm::app

@@ -89,9 +89,11 @@ int write_spectrum(const SpectrumTexts& texts, const Session& session) {
   const ResultTable<SpectrumRow> table = spectrum_table(law.spec.response == Quantity::stress);
   Json json{{"law", to_json(law)}};
   json.update(table.lists(rows));
-  deliver(session.json() ? answer_text(session, json)
-                         : fmt::format("{}: {}\n\n{}", law_name(law.spec), law_words(law.spec),
-                                       table.text(rows)),
+  const std::string next = fmt::format("tpm export {} --to febio", shell_word(texts.law));
+  add_end(json, {}, {}, next);
+  deliver(session.json() ? answer_text(session, std::move(json))
+                         : fmt::format("{}: {}\n\n{}{}", law_name(law.spec), law_words(law.spec),
+                                       table.text(rows), next_line(next)),
           texts.output);
   deliver_csv(table.csv(rows), csv);
   return 0;

@@ -124,8 +124,9 @@ void say_with_files(const Session& session, Json json, std::string_view text,
                     const std::vector<std::string>& files, const std::string& next) {
   add_end(json, {}, files, next);
   if (session.json()) return write_output(answer_text(session, std::move(json)));
-  write_output(fmt::format("{}wrote {}\n{}", text, fmt::join(files, ", "),
-                           next.empty() ? std::string() : fmt::format("next: {}\n", next)));
+  const std::string wrote =
+      files.empty() ? std::string() : fmt::format("wrote {}\n", fmt::join(files, ", "));
+  write_output(fmt::format("{}{}{}", text, wrote, next_line(next)));
 }
 
 void will_write_into(const std::filesystem::path& folder, std::initializer_list<const char*> names,
@@ -275,6 +276,7 @@ int run(int argc, char** argv) {
 
   try {
     std::vector<std::string> words = command_words(argc, argv);
+    session.words = words;
     std::reverse(words.begin(), words.end());  // CLI11 takes them from the back
     app.parse(std::move(words));
   } catch (const CLI::Success& wanted) {  // --help, --version

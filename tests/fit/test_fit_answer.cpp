@@ -159,6 +159,25 @@ TEST_CASE("the short answer of depths and forces times 1e-6 has units of their s
   CHECK_THAT(rows, Contains("\noffset ") && Contains(" pN ") && Contains(" pm "));
 }
 
+TEST_CASE("the verbose text of a fit has the units of its short answer", "[fit][answer]") {
+  const Selection s = selected_at_scale(1e-6);
+  const std::string text = to_terminal_text(s.candidates[s.recommended].fit);
+  INFO(text);
+  CHECK_THAT(text, Contains(" pN ") && Contains(" pm "));
+  const auto residual = text.find("rms residual ");
+  REQUIRE(residual != std::string::npos);
+  CHECK(text.substr(residual, text.find(" of the peak", residual) - residual).find("e-") ==
+        std::string::npos);
+}
+
+TEST_CASE("words of a command to type stay one word each in a shell", "[fit][answer]") {
+  CHECK(shell_quoted("--folder") == "--folder");
+  CHECK(shell_quoted("4 mm") == "'4 mm'");
+  CHECK(shell_quoted("") == "''");
+  CHECK(shell_quoted("it's") == "'it'\\''s'");
+  CHECK(shell_word("-a file") == "'./-a file'");
+}
+
 TEST_CASE("a unit fits the size of its value, and one that takes no prefix stays",
           "[fit][answer]") {
   const Unit newton = parse_unit("N", "test");

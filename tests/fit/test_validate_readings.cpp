@@ -114,6 +114,9 @@ TEST_CASE("an instrument is stated once, and fits and budgets take it", "[valida
   CHECK_THAT(budget.instrument->largest, WithinRel(1.959964 * u / peak, 0.03));
   CHECK(budget.data_part >= budget.instrument->largest);
   CHECK_THAT(to_terminal_text(budget), Contains("instrument cell, 95 %"));
+  ErrorBudget weak = budget;
+  weak.peak_N = 2.02e-4;
+  CHECK_THAT(to_terminal_text(weak), Contains("peak 202 uN; in % of it"));
 }
 
 TEST_CASE("without readings before contact a fit's zero is what the instrument states",

@@ -167,10 +167,10 @@ TEST_CASE("A session whose largest force no hand feels says so, in text and in J
   SessionRun run;
   run.model = make_loop_model(session);
   run.largest_force_N = 0.76e-3;
-  CHECK_THAT(run_text(session, run), Contains("largest force 0.00076 N: no hand feels it"));
+  CHECK_THAT(run_text(session, run), Contains("largest force 760 uN: no hand feels it"));
   CHECK(run_json(session, run).dump().find("\"perceptible\":false") != std::string::npos);
   run.largest_force_N = 0.098;
-  CHECK_THAT(run_text(session, run), Contains("largest force 0.098 N\n"));
+  CHECK_THAT(run_text(session, run), Contains("largest force 98 mN\n"));
   CHECK(run_json(session, run).dump().find("\"perceptible\":true") != std::string::npos);
 }
 

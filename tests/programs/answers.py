@@ -4,13 +4,15 @@
     answers.py ROOT TPM            compares
     answers.py ROOT TPM --write    writes the table of docs/json.md
 
-Runs each command once. SLOW are those that take minutes, wait for a client or measure the machine.
+Runs each command once, and then each command that an answer names as the next. SLOW are those that take minutes, wait for a client or measure the machine.
 """
 
 import hashlib
 import json
+import os
 import re
 import shlex
+import shutil
 import subprocess
 import sys
 import tempfile
@@ -25,14 +27,17 @@ example
 data list
 data show evren_relaxation
 data check recording.csv
-data import recording.csv -o imported
-data pack evren_static -o packed.h5
+data import recording.csv
+data import recording.csv -o imported --overwrite
+data pack evren_static -o packed.h5 --overwrite
 fit recording.csv --laws linear-1 --starts 2 --folder fitted
 fit CONFIGS/liver_relaxation.json --starts 2
+fit "my recording.csv" --laws linear-1 --starts 2 --folder "my fit"
 predict fitted/law.json {PRESS}
 predict fitted/law.json --frequencies "1 Hz, 10 Hz"
 validate fitted/law.json recording.csv --require 10%
 identify recording.csv --laws linear-1 --no-loop
+identify "my recording.csv" --laws linear-1 --no-loop -o answer.json --folder "it's identified"
 laws
 laws power-2
 design CONFIGS/design_liver.json --repetitions 0
@@ -46,6 +51,7 @@ view small.h5 -o small.html
 plan CONFIGS/plan/star.json --costs nominal
 plan CONFIGS/plan/star.json --costs nominal --estimate
 sweep CONFIGS/sweep_x_depth_100.json -o sweep.h5
+sweep CONFIGS/sweep_x_depth_100.json -o sweep.h5
 sweep CONFIGS/sweep_x_depth_100.json -o parts.h5 --shard 1/1
 sweep merge CONFIGS/sweep_x_depth_100.json -o parts.h5
 sweep show sweep.h5
@@ -53,11 +59,14 @@ sweep best sweep.h5 --objective peak_force
 sweep CONFIGS/sweep_convergence_step.json -o step.h5
 sweep convergence step.h5 --axis step
 hil devices
+hil check --duration "0.2 s"
 hil run session.json -o session.tpmrec
 hil verify session.tpmrec
 hil report session.tpmrec
 hil export session.tpmrec -o rows.h5
 budget fitted/law.json {PRESS} --draws 100
+budget "my fit/law.json" "my recording.csv" --draws 100
+budget fitted/law.json recording.csv --draws 100 --folder budget
 paper tables
 paper audit
 accuracy verify closed-forms
@@ -65,14 +74,19 @@ accuracy verify --list
 accuracy benchmark --list
 version
 """
-SLOW = {"hil serve", "hil check", "hil identify", "hil stability", "paper experiments", "accuracy benchmark", "accuracy stability",
+SLOW = {"hil serve", "hil identify", "hil stability", "paper experiments", "accuracy benchmark", "accuracy stability",
         "sweep sensitivity"}
 BEGIN, END = "<!-- members: written by tests/programs/answers.py -->", "<!-- end of members -->"
 
 
-# The text of these ends with the files and the command to type next; so does the JSON. Of the quick ones both are compared.
-ENDED = {"budget", "fit", "hil run", "hil verify", "hil report", "identify", "material", "simulate", "validate"}
-QUICK = ("fit recording.csv", "validate ", "budget ", "design CONFIGS/design_liver.json")
+# Every answer has `files` and `next`, but these, after which nothing is to be typed.
+UNENDED = ("data show", "data check", "laws power-2", "design --laws", "hil devices", "accuracy verify --list",
+           "accuracy benchmark --list", "version")
+# Of the quick ones the text is compared, too: it ends with the same command.
+QUICK = ("example", "data ", "fit recording.csv", 'fit "my', "predict", "validate ", "budget ", "design CONFIGS/design_liver.json",
+         "laws", "network", "paper", "sweep", "view", "plan CONFIGS/plan/star.json --costs nominal --estimate")
+# Commands to type next that take minutes: read, not run.
+LONG = ("tpm paper report", "tpm plan configs/", "tpm accuracy", "tpm fit ")
 
 
 def with_format(command, path=""):
@@ -141,7 +155,53 @@ def faults_of_end(answer, text):
     if not isinstance(answer.get("files"), list) or "next" not in answer:
         return ["files or next are missing"]
     said = re.findall(r"(?:^|; )next: (.*)$", text, re.M)
-    return [f"next is {answer['next']}, the text says {said}"] if said != [answer["next"]] else []
+    wanted = [] if answer["next"] is None else [answer["next"]]
+    return [f"next is {answer['next']}, the text says {said}"] if said != wanted else []
+
+
+def faults_of_line(line, usage):
+    """What keeps a command to type next from being one that tpm takes: its words, names of options, number of arguments."""
+    words = shlex.split(line)
+    if words[:1] != ["tpm"]:
+        return [f"'{line}' is no command"]
+    command, rest = usage, words[1:]
+    while rest and rest[0] in [below["name"] for below in command.get("commands", [])]:
+        command = next(below for below in command["commands"] if below["name"] == rest[0])
+        rest = rest[1:]
+    names = {name: option for option in command["options"] for name in option["names"]}
+    faults, given = [], []
+    while rest:
+        word = rest.pop(0)
+        if not word.startswith("-"):
+            given.append(word)
+        elif word not in names:
+            faults.append(f"'{line}': no option {word}")
+        elif not names[word].get("flag", False) and rest:
+            rest.pop(0)
+    if any(re.search("[A-Z]{4}", word) and not Path(word).is_absolute() for word in given):
+        faults.append(f"'{line}' has a name to be replaced")
+    return faults
+
+
+def faults_of_next(line, usage, program, folder):
+    """Types a command that an answer names, beside the files of that answer."""
+    faults = faults_of_line(line, usage)
+    if faults or line.startswith(LONG):
+        return faults
+    with tempfile.TemporaryDirectory() as name:
+        there = Path(name) / "typed"
+        shutil.copytree(folder, there)
+        words = shlex.split(line)
+        for before, word in zip(words, words[1:]):
+            if before == "-o":  # a name that is free
+                (there / word).unlink(missing_ok=True)
+        path = f"{program.parent}:{os.environ['PATH']}"
+        try:
+            done = subprocess.run(["sh", "-c", line], cwd=there, env=dict(os.environ, PATH=path), capture_output=True,
+                                  text=True, timeout=300)
+        except subprocess.TimeoutExpired:
+            return [f"next: {line}: has not ended after 300 s"]
+    return [f"next: {line}: ends with {done.returncode}: {done.stderr.strip()}"] if done.returncode > 1 else []
 
 
 def orders_of_shards(program, sweep, folder):
@@ -167,7 +227,7 @@ def main():
 
     usage = json.loads(subprocess.run([program, "--json-usage"], capture_output=True, text=True, check=True).stdout)
     wanted = set(with_format(usage))
-    members, faults, met = {}, 0, set()
+    members, faults, met, typed = {}, 0, set(), set()
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
         (folder / "small.json").write_text(json.dumps(INDENTED))
@@ -179,13 +239,24 @@ def main():
                 faults += 1
                 print(f"tpm {line}: exit code {done.returncode}: {done.stderr.strip()}")
                 continue
-            answer = json.loads(done.stdout)
+            try:
+                # Beside a file for the answer there is none on the terminal.
+                answer = json.loads((folder / "answer.json").read_text() if "answer.json" in words else done.stdout)
+            except ValueError:
+                faults += 1
+                print(f"tpm {line}: exit code {done.returncode}, and no JSON: '{done.stdout}'")
+                continue
+            if line == "example recording":
+                shutil.copy(folder / "recording.csv", folder / "my recording.csv")
             wrong = faults_of(answer, words, folder, done.returncode)
-            if line.startswith(QUICK):
+            if line.startswith(QUICK) and not line.startswith(UNENDED):
                 done = subprocess.run([program, *words], cwd=folder, capture_output=True, text=True, timeout=300)
                 wrong += faults_of_end(answer, done.stdout)
-            elif answer["command"] in ENDED and not {"files", "next"} <= answer.keys():
+            elif not line.startswith(UNENDED) and not {"files", "next"} <= answer.keys():
                 wrong.append("files or next are missing")
+            if answer.get("next") and answer["next"] not in typed:
+                typed.add(answer["next"])
+                wrong += faults_of_next(answer["next"], usage, program, folder)
             faults += len(wrong)
             for fault in wrong:
                 print(f"tpm {line}: {fault}")

@@ -64,15 +64,19 @@ std::string_view trimmed(std::string_view text, std::string_view blanks) noexcep
   return text.substr(first, text.find_last_not_of(blanks) - first + 1);
 }
 
-std::string shell_word(std::string_view name) {
+std::string shell_quoted(std::string_view word) {
   constexpr std::string_view kPlain =
       "abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ0123456789_./:=@%+,-";
-  std::string word(name);
-  if (word.starts_with('-')) word.insert(0, "./");
-  if (!word.empty() && word.find_first_not_of(kPlain) == std::string::npos) return word;
+  if (!word.empty() && word.find_first_not_of(kPlain) == std::string_view::npos) {
+    return std::string(word);
+  }
   std::string quoted = "'";
   for (const char c : word) quoted += c == '\'' ? std::string("'\\''") : std::string(1, c);
   return quoted + "'";
+}
+
+std::string shell_word(std::string_view name) {
+  return shell_quoted(name.starts_with('-') ? "./" + std::string(name) : std::string(name));
 }
 
 std::string with_arguments_for_options(std::string_view message) {

@@ -33,6 +33,9 @@ enum class LineEnds { kept, escaped };
 /// are not UTF-8 become '?'. Tabs stay.
 [[nodiscard]] std::string for_terminal(std::string_view text, LineEnds line_ends);
 
+/// A word of a command line as a shell takes it: quoted where it has to be.
+[[nodiscard]] std::string shell_quoted(std::string_view word);
+
 /// A file name as a shell takes it: quoted where it has to be. For a command that a user is to
 /// type, whole.
 [[nodiscard]] std::string shell_word(std::string_view name);

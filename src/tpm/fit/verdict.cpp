@@ -205,8 +205,12 @@ std::string verdict_text(const ParameterResult& p) {
 }
 
 std::string limit_text(const ParameterResult& p, bool upper) {
+  return limit_text(p, upper, p.parameter.unit);
+}
+
+std::string limit_text(const ParameterResult& p, bool upper, const Unit& unit) {
   const std::optional<double>& limit = upper ? p.upper : p.lower;
-  if (limit) return significant(*limit / p.parameter.unit.to_si, 4);
+  if (limit) return significant(*limit / unit.to_si, 4);
   return has_failed(upper ? p.profile.above : p.profile.below) ? "failed" : "open";
 }
 

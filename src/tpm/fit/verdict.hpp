@@ -28,6 +28,10 @@ namespace tpm::fit {
 /// "failed" where the profile did.
 [[nodiscard]] std::string limit_text(const ParameterResult& parameter, bool upper);
 
+/// The same in this unit, of the same dimension.
+[[nodiscard]] std::string limit_text(const ParameterResult& parameter, bool upper,
+                                     const Unit& unit);
+
 /// One sentence for a reader, made from the numbers.
 [[nodiscard]] std::string parameter_words(const ParameterResult& parameter, double level);
 

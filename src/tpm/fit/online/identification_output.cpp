@@ -43,27 +43,35 @@ Json sample_json(const Identification& id, const IdentifiedSample& sample) {
   return json;
 }
 
+/// The unit in which a parameter is shown with its interval.
+Unit shown_in(const SequentialParameter& p) {
+  // The width, if it is larger, as of a contact near zero.
+  const double width = p.upper - p.lower;
+  const double size = std::isfinite(width) ? std::max(std::abs(p.estimate), width) : p.estimate;
+  return sized_unit(p.parameter.unit, size);
+}
+
 std::string parameter_line(const SequentialParameter& p) {
+  const Unit unit = shown_in(p);
   const auto shown = [&](double value) {
-    return std::isfinite(value) ? significant(value / p.parameter.unit.to_si, 4) : "open";
+    return std::isfinite(value) ? significant(value / unit.to_si, 4) : "open";
   };
   if (p.at_bound) {
     return fmt::format("  {:<14} {:>12} {} (at a bound)\n", p.parameter.name, shown(p.estimate),
-                       p.parameter.unit.symbol);
+                       unit.symbol);
   }
   return fmt::format("  {:<14} {:>12} {:>28} {:<6} +-{} %{}\n", p.parameter.name, shown(p.estimate),
-                     fmt::format("{} .. {}", shown(p.lower), shown(p.upper)),
-                     p.parameter.unit.symbol, significant(100.0 * p.relative_half_width(), 3),
+                     fmt::format("{} .. {}", shown(p.lower), shown(p.upper)), unit.symbol,
+                     significant(100.0 * p.relative_half_width(), 3),
                      p.nuisance ? " (of the recording)" : "");
 }
 
 std::string sample_text(const Identification& id, const IdentifiedSample& sample) {
   const Unit response = shown_unit(quantity_dimension(id.laws[sample.law].response));
   std::string text = fmt::format(
-      "{} s after {} samples: {}, noise {} {}, neighbours correlated by {}\n",
+      "{} s after {} samples: {}, noise {}, neighbours correlated by {}\n",
       significant(sample.time_s, 4), sample.estimate.samples, law_name(id.laws[sample.law]),
-      significant(sample.estimate.sigma / response.to_si, 3), response.symbol,
-      significant(sample.estimate.phi, 3));
+      sized_text(response, sample.estimate.sigma, 3), significant(sample.estimate.phi, 3));
   for (const SequentialParameter& p : sample.estimate.parameters) text += parameter_line(p);
   return text;
 }
@@ -121,10 +129,7 @@ ShortAnswer short_answer(const Identification& id) {
                      fmt::format("{:.4g} % interval", 100.0 * id.options.level), "unit",
                      "half width")};
   for (const SequentialParameter& p : result.estimate.parameters) {
-    // The width, if it is larger, as of a contact near zero.
-    const double width = p.upper - p.lower;
-    const double size = std::isfinite(width) ? std::max(std::abs(p.estimate), width) : p.estimate;
-    const Unit unit = sized_unit(p.parameter.unit, size);
+    const Unit unit = shown_in(p);
     const auto shown = [&](double value) {
       return std::isfinite(value) ? significant(value / unit.to_si, 4) : std::string("open");
     };

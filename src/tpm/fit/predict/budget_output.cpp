@@ -99,8 +99,9 @@ Json to_json(const ErrorBudget& b) {
 }
 
 std::string to_terminal_text(const ErrorBudget& b) {
-  std::string text = fmt::format("{}, peak {} N; in % of it\n\n{}", b.title,
-                                 significant(b.peak_N, 4), line_table().text(b.lines));
+  std::string text =
+      fmt::format("{}, peak {}; in % of it\n\n{}", b.title,
+                  sized_text(Dimension::force, b.peak_N, 4), line_table().text(b.lines));
   for (const auto& [words, part] : sums_of(b, true)) {
     text += fmt::format("{:<54} {:>9}\n", words, in_percent(part));
   }

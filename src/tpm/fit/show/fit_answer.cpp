@@ -24,12 +24,6 @@ std::string answer_head(double level) {
                     "unit", "verdict");
 }
 
-/// The limit in `unit`, or why there is none.
-std::string sized_limit(const ParameterResult& p, bool upper, const Unit& unit) {
-  const std::optional<double>& limit = upper ? p.upper : p.lower;
-  return limit ? significant(*limit / unit.to_si, 4) : limit_text(p, upper);
-}
-
 std::string parameter_row(const ParameterResult& p) {
   constexpr double kNothing = 1e-4;  // of the size of the row
   const double size = size_of(p);
@@ -38,7 +32,7 @@ std::string parameter_row(const ParameterResult& p) {
   const std::string interval =
       p.verdict == Verdict::not_profiled
           ? "-"
-          : fmt::format("{} .. {}", sized_limit(p, false, unit), sized_limit(p, true, unit));
+          : fmt::format("{} .. {}", limit_text(p, false, unit), limit_text(p, true, unit));
   return answer_row(p.parameter.name, significant(shown / unit.to_si, 5), interval, unit.symbol,
                     verdict_text(p));
 }

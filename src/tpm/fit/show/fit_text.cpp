@@ -5,6 +5,7 @@
 #include <cmath>
 
 #include "tpm/base/quantity_text.hpp"
+#include "tpm/base/sized_unit.hpp"
 #include "tpm/base/text.hpp"
 #include "tpm/fit/fit.hpp"
 #include "tpm/fit/fit_flags.hpp"
@@ -14,9 +15,9 @@
 namespace tpm::fit {
 namespace {
 
-std::string interval_text(const ParameterResult& p) {
+std::string interval_text(const ParameterResult& p, const Unit& unit) {
   if (p.verdict == Verdict::not_profiled) return "-";
-  return fmt::format("{} .. {}", limit_text(p, false), limit_text(p, true));
+  return fmt::format("{} .. {}", limit_text(p, false, unit), limit_text(p, true, unit));
 }
 
 std::string parameter_table(const FitResult& result) {
@@ -24,11 +25,11 @@ std::string parameter_table(const FitResult& result) {
       fmt::format("{:<10} {:>12} {:>12}  {:<24} {:<8} {}\n", "parameter", "estimate", "std. error",
                   fmt::format("{:.4g} % interval", 100.0 * result.config.level), "unit", "verdict");
   for (const ParameterResult& p : result.parameters) {
-    const double unit = p.parameter.unit.to_si;
+    const Unit unit = sized_unit(p.parameter.unit, size_of(p));
     text += fmt::format("{:<10} {:>12} {:>12}  {:<24} {:<8} {}\n", p.parameter.name,
-                        significant(p.estimate / unit, 5),
-                        p.standard_error ? significant(*p.standard_error / unit, 3) : "-",
-                        interval_text(p), p.parameter.unit.symbol, verdict_text(p));
+                        significant(p.estimate / unit.to_si, 5),
+                        p.standard_error ? significant(*p.standard_error / unit.to_si, 3) : "-",
+                        interval_text(p, unit), unit.symbol, verdict_text(p));
   }
   return text;
 }
@@ -39,14 +40,16 @@ std::string data_table(const FitResult& result) {
   std::string text = fmt::format("{:<18} {:<{}} {:>18} {:>10} {:>8}  {:<10} {}\n", "data set",
                                  "reading", width, "observed", "model", "z", "provenance", "");
   for (const FittedDatum& d : result.data) {
-    const auto& [symbol, dimension, unit] = shown_unit(quantity_dimension(d.datum.quantity));
+    const Unit unit = sized_unit(shown_unit(quantity_dimension(d.datum.quantity)),
+                                 d.datum.value ? *d.datum.value : *d.datum.upper);
     const std::string observed =
-        d.datum.value ? fmt::format("{} {}", significant(*d.datum.value / unit, 4), symbol)
-                      : fmt::format("{}-{} {}", significant(*d.datum.lower / unit, 3),
-                                    significant(*d.datum.upper / unit, 3), symbol);
+        d.datum.value ? with_unit(significant(*d.datum.value / unit.to_si, 4), unit)
+                      : with_unit(fmt::format("{}-{}", significant(*d.datum.lower / unit.to_si, 3),
+                                              significant(*d.datum.upper / unit.to_si, 3)),
+                                  unit);
     text += fmt::format("{:<18} {:<{}} {:>18} {:>10} {:>8.2f}  {:<10} {}\n",
                         result.config.data[d.datum.choice].dataset, d.datum.label, width, observed,
-                        significant(d.predicted / unit, 4), d.standardised,
+                        significant(d.predicted / unit.to_si, 4), d.standardised,
                         provenance_name(d.datum.provenance), d.datum.held_out ? "held out" : "");
   }
   return text;
@@ -66,10 +69,11 @@ std::string minima_table(const FitResult& result) {
                         m.starts);
     for (std::size_t i = 0; i < m.low.size(); ++i) {
       const FitParameter& p = result.parameters[i].parameter;
-      const std::string low = significant(m.low[i] / p.unit.to_si, 4);
-      const std::string high = significant(m.high[i] / p.unit.to_si, 4);
+      const Unit unit = sized_unit(p.unit, std::max(std::abs(m.low[i]), std::abs(m.high[i])));
+      const std::string low = significant(m.low[i] / unit.to_si, 4);
+      const std::string high = significant(m.high[i] / unit.to_si, 4);
       text +=
-          fmt::format(" {} {}", p.name, with_unit(low == high ? low : low + " to " + high, p.unit));
+          fmt::format(" {} {}", p.name, with_unit(low == high ? low : low + " to " + high, unit));
       text += i + 1 < m.low.size() ? "," : "\n";
     }
   }
@@ -79,7 +83,7 @@ std::string minima_table(const FitResult& result) {
 /// "liver.csv: 500 of 600 samples fitted, rms residual 1.2 mN (0.4 % of the peak), ..."
 std::string recording_line(const FitResult& result, const RecordingFit& r) {
   const Unit unit = shown_unit(quantity_dimension(r.response_quantity));
-  const auto shown = [&](double si) { return with_unit(significant(si / unit.to_si, 3), unit); };
+  const auto shown = [&](double si) { return sized_text(unit, si, 3); };
   std::string text = fmt::format(
       "{}: {} of {} samples fitted, rms residual {}", result.config.data[r.choice].dataset,
       std::count(r.fitted.begin(), r.fitted.end(), true), r.time_s.size(), shown(r.rms_residual));
@@ -123,7 +127,8 @@ std::string bootstrap_table(const FitResult& result) {
   const BootstrapResult& b = result.bootstrap.value();
   std::string text = b.summary + "\n";
   for (std::size_t i = 0; i < b.parameters.size(); ++i) {
-    const Unit& unit = result.parameters[i].parameter.unit;
+    const ParameterResult& fitted = result.parameters[i];
+    const Unit unit = sized_unit(fitted.parameter.unit, size_of(fitted));
     const BootstrapParameter& p = b.parameters[i];
     const auto interval = [&](const BootstrapInterval& limits) {
       return fmt::format("{} .. {}", significant(limits.lower / unit.to_si, 4),

@@ -164,16 +164,22 @@ std::vector<PhaseKindErrors> errors_by_kind(const Verification& v) {
   return mapped<PhaseKindErrors>(kinds, [](const auto& kind) { return kind.second; });
 }
 
+std::string newtons(double force_N, int digits = 3) {
+  return sized_text(Dimension::force, force_N, digits);
+}
+
 ResultTable<PhaseKindErrors> kind_table(double peak_N) {
   using Row = PhaseKindErrors;
   using Of = ResultColumn<Row>;
   const auto of_peak = [=](const Row& k) {
     return peak_N > 0.0 ? Json(k.max_N / peak_N) : Json(nullptr);
   };
+  const auto rms = [](const Row& k) { return Cell{newtons(k.rms_N())}; };
+  const auto most = [](const Row& k) { return Cell{newtons(k.max_N)}; };
   const auto percent = [=](const Row& k) { return Cell{share_words(k.max_N, peak_N)}; };
   return {{Of("kind", &Row::kind).shown("phase", -10), Of("count", &Row::count).shown("count", 7),
-           Of("rms_N", &Row::rms_N).shown("rms mN", 10, 1e-3, 3),
-           Of("max_N", &Row::max_N).shown("max mN", 10, 1e-3, 3),
+           Of("rms_N", &Row::rms_N).shown("rms", 12).in_words(rms),
+           Of("max_N", &Row::max_N).shown("max", 12).in_words(most),
            Of("max_over_peak", of_peak).shown("max/peak", 10).in_words(percent)}};
 }
 
@@ -185,8 +191,10 @@ std::string verified_words(const HilRecording& recording, const Verification& v)
                    : " of " + significant(recording.session.duration_s(), 6) + " s");
 }
 
-std::string newtons(double force_N, int digits = 3) {
-  return sized_text(Dimension::force, force_N, digits);
+/// motion_cost() in the unit that fits the force.
+std::string cost_words(const Verification& v) {
+  return v.motion_error_N ? fmt::format("which can cost {}", newtons(*v.motion_error_N))
+                          : motion_cost(v, 1.0, "N");
 }
 
 std::string said_by_device(const ServoOutcome& o, const std::vector<DeviceFinding>& findings) {
@@ -332,7 +340,7 @@ std::string run_text(const HilSession& session, const SessionRun& run) {
       o.counts.force_limited, o.counts.slipped, o.counts.damped, o.counts.beyond_model,
       o.dropped_records);
   text += fmt::format(
-      "largest force {} N{}\n", significant(run.largest_force_N, 3),
+      "largest force {}{}\n", newtons(run.largest_force_N),
       run.largest_force_N >= kLeastFeltForce_N
           ? std::string()
           : fmt::format(": no hand feels it (less than {} N, assumed)", kLeastFeltForce_N));
@@ -387,29 +395,27 @@ std::string motion_cost(const Verification& v, double per_newton, std::string_vi
 
 std::string verification_text(const HilRecording& recording, const Verification& v) {
   std::string text = fmt::format(
-      "{}\n{}\nverified {} against: {}\nmotion through {} knots within {} um, {}; the "
-      "reference's own error estimate {} N\n",
+      "{}\n{}\nverified {} against: {}\nmotion through {} knots within {}, {}; the "
+      "reference's own error estimate {}\n",
       recording.session.title, device_line(recording), verified_words(recording, v), v.reference,
-      v.knots, significant(1e6 * v.motion_tolerance_m, 3), motion_cost(v, 1.0, "N"),
-      significant(v.reference_error_N, 3));
+      v.knots, sized_text(Dimension::length, v.motion_tolerance_m, 3), cost_words(v),
+      newtons(v.reference_error_N));
   const ResultTable<PhaseKindErrors> table = kind_table(v.all.peak_N);
   text += table.text(errors_by_kind(v)) +
           table.line({"all", v.phases.size(), 1, v.all.rms_N * v.all.rms_N, v.all.max_N}) +
-          fmt::format("   peak {} N\n", significant(v.all.peak_N, 4));
+          fmt::format("   peak {}\n", newtons(v.all.peak_N, 4));
   for (const Remark& remark : all_remarks(recording, v)) text += "note: " + remark.text + "\n";
   for (const CrossCheck& o : v.others) {
-    text += fmt::format("beside: {}, {} to {} s: rms {} mN, max {} mN; {} mN from the reference\n",
-                        o.name, significant(o.start_s, 4), significant(o.end_s, 4),
-                        significant(1e3 * o.commanded.rms_N, 3),
-                        significant(1e3 * o.commanded.max_N, 3), significant(1e3 * o.apart_N, 3));
+    text += fmt::format("beside: {}, {} to {} s: rms {}, max {}; {} from the reference\n", o.name,
+                        significant(o.start_s, 4), significant(o.end_s, 4),
+                        newtons(o.commanded.rms_N), newtons(o.commanded.max_N), newtons(o.apart_N));
   }
   for (const BesideExperiment& e : v.experiment) {
-    text +=
-        fmt::format("experiment: {} mm at {} mm/s, {}: measured {} N, commanded {} N ({}): {}\n",
-                    significant(1e3 * e.depth_m, 3), significant(1e3 * e.rate_m_per_s, 3), e.label,
-                    significant(e.measured_N, 3), significant(e.commanded_N, 3),
-                    percent_text(100.0 * (e.commanded_N / e.measured_N - 1.0), 1),
-                    cause_of_difference(e, v.material));
+    text += fmt::format("experiment: {} mm at {} mm/s, {}: measured {}, commanded {} ({}): {}\n",
+                        significant(1e3 * e.depth_m, 3), significant(1e3 * e.rate_m_per_s, 3),
+                        e.label, newtons(e.measured_N), newtons(e.commanded_N),
+                        percent_text(100.0 * (e.commanded_N / e.measured_N - 1.0), 1),
+                        cause_of_difference(e, v.material));
   }
   return text;
 }
@@ -437,9 +443,7 @@ ShortAnswer short_answer(const HilRecording& recording, const Verification& v) {
   answer.limits = {
       fmt::format("limit: motion through {} knots within {}, {}; the reference's own error "
                   "estimate {}; the model's {}",
-                  v.knots, sized_text(Dimension::length, v.motion_tolerance_m, 3),
-                  v.motion_error_N ? fmt::format("which can cost {}", newtons(*v.motion_error_N))
-                                   : motion_cost(v, 1.0, "N"),
+                  v.knots, sized_text(Dimension::length, v.motion_tolerance_m, 3), cost_words(v),
                   newtons(v.reference_error_N), newtons(v.model_error_N))};
   constexpr std::size_t kShown = 3;  // of cross-checks
   for (std::size_t i = 0; i < std::min(v.others.size(), kShown); ++i) {
