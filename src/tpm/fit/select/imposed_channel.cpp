@@ -10,8 +10,8 @@
 #include <utility>
 #include <vector>
 
-#include "tpm/base/median.hpp"
 #include "tpm/base/text.hpp"
+#include "tpm/data/off_neighbours.hpp"
 #include "tpm/fit/likelihood/load_imposed.hpp"
 #include "tpm/fit/likelihood/starts.hpp"
 #include "tpm/work/give_up.hpp"
@@ -29,19 +29,6 @@ double average_of(std::span<const double> values) {
   double sum = 0.0;
   for (const double v : values) sum += v;
   return sum / static_cast<double>(values.size());
-}
-
-/// Standard deviation of the noise, from samples against the line between their neighbours.
-double noise_of_channel(std::span<const double> time_s, std::span<const double> values) {
-  constexpr double kNormal = 0.6745;  // the median of |z|
-  std::vector<double> off;
-  for (std::size_t i = 1; i + 1 < values.size(); ++i) {
-    const double share = (time_s[i] - time_s[i - 1]) / (time_s[i + 1] - time_s[i - 1]);
-    const double line = values[i - 1] + share * (values[i + 1] - values[i - 1]);
-    const double scale = std::sqrt(1.0 + share * share + (1.0 - share) * (1.0 - share));
-    off.push_back(std::abs(values[i] - line) / scale);
-  }
-  return median(std::move(off)) / kNormal;
 }
 
 /// The part of a recording up to where the stress falls back.
@@ -266,8 +253,8 @@ std::optional<Channels> channels_of(const Recording& r) {
              std::span(r.response).first(end)};
   c.stretched = stretched;
   if (!(range_of(c.answer) > 0.0 && range_of(c.load) > 0.0)) return std::nullopt;
-  c.answer_noise = noise_of_channel(c.time, c.answer);
-  c.load_noise = noise_of_channel(c.time, c.load);
+  c.answer_noise = data::noise_about_neighbours(c.time, c.answer);
+  c.load_noise = data::noise_about_neighbours(c.time, c.load);
   return c;
 }
 
