@@ -38,6 +38,15 @@ bool contact_is_seen(const LawSpec& law, const PreparedRecording& r) {
   return !r.phases.preloaded && r.phases.contact_found && contact_s >= r.from_s;
 }
 
+/// True if a stretched strip is slack at first, and the recording shows where it becomes taut.
+bool shows_slack(const PreparedRecording& r) {
+  return r.phases.contact_found && !r.phases.preloaded &&
+         r.recording.time_s[r.phases.contact_index] >= r.from_s;
+}
+
+/// Part of the travel by which bounds leave a held parameter free.
+constexpr double kHeldWithin = 1e-6;
+
 /// Contact may lie this many times the depth of the recording before its start at most.
 constexpr double kFurthestContact = 2.0;
 
@@ -45,10 +54,12 @@ constexpr double kFurthestContact = 2.0;
 /// tenths of the stretch; a strip that is taut from the start was slack no further back than a
 /// contact may lie, and not below a tenth of the length at the start. These bounds are not widened
 /// where a fit presses on them: a bend of the kernel from further away swallows a lack of fit.
-AutomaticBounds slack_length_bounds(const LawSpec& law, const PreparedRecording& r) {
+/// @param own this recording shows where it becomes taut: a threshold found that late
+AutomaticBounds slack_length_bounds(const LawSpec& law, const PreparedRecording& r, bool own,
+                                    std::string name) {
   constexpr double kMostOfStretch = 0.9, kShortest = 0.1;
   FitParameter fit;
-  fit.name = "slack_length";
+  fit.name = std::move(name);
   fit.scale = Scale::linear;
   fit.unit = shown_unit(quantity_dimension(law.drive));
   const double begin = start_drive(r);
@@ -56,7 +67,7 @@ AutomaticBounds slack_length_bounds(const LawSpec& law, const PreparedRecording&
   fit.lower = std::max(begin - kFurthestContact * range, kShortest * begin);
   fit.upper = begin + kMostOfStretch * range;
   // Under a straight kernel that was in contact from the start, depth and offset say the same.
-  if (!bends(law)) fit.lower = std::max(begin, r.recording.drive.front());
+  if (!bends(law)) fit.lower = std::max(own ? fit.lower : begin, r.recording.drive.front());
   fit.start = std::max(begin, fit.lower);
   return {readable(std::move(fit)), std::nullopt};
 }
@@ -221,7 +232,7 @@ void take_level_before_load(FitConfig& config, const PreparedRecording& r) {
 /// Zero and contact of recordings that are no indentations, and of creep: nothing is measured
 /// beforehand but the force before it rises.
 void add_free_placement(FitConfig& config, const LawModel& model, const PreparedRecording& r,
-                        std::size_t i, std::vector<std::size_t> scope, std::string offset,
+                        const std::vector<std::size_t>& scope, std::string offset,
                         const SetupOptions& options) {
   const LawSpec& law = model.spec();
   if (r.load_imposed) {
@@ -232,19 +243,66 @@ void add_free_placement(FitConfig& config, const LawModel& model, const Prepared
   }
   add_automatic(config, offset_bounds(law, r, std::move(offset)), {{model.index("offset"), scope}});
   if (options.measured) take_level_before_load(config, r);
-  // The slack length belongs to the specimen.
-  const bool slack = is_stretch(law) && i == 0 && options.nuisance != Nuisance::offset;
-  if (slack) add_automatic(config, slack_length_bounds(law, r), {{model.index("contact"), {}}});
 }
 
-/// Contact that is known from a stated force, where each recording has its own.
-AutomaticBounds held_contact(const LawSpec& law, const PreparedRecording& r, std::string name) {
-  constexpr double kHeld = 1e-6;  // of the travel
-  const double at = r.phases.contact_drive;
-  const double range = r.phases.peak_drive - at;
+/// Slack lengths of a stretch: one of each of several recordings that show it (the strip may have
+/// been gripped again, or be another one), and one for all others, which do not.
+void add_slack_lengths(FitConfig& config, const LawModel& model,
+                       std::span<const PreparedRecording> recordings) {
+  const std::size_t contact = model.index("contact");
+  const bool several = recordings.size() > 1;
+  std::vector<std::size_t> taut;
+  for (std::size_t i = 0; i < recordings.size(); ++i) {
+    const PreparedRecording& r = recordings[i];
+    if (r.load_imposed) continue;
+    if (several && shows_slack(r)) {
+      add_automatic(
+          config,
+          slack_length_bounds(model.spec(), r, true, fmt::format("slack_length {}", r.name)),
+          {{contact, {i}}});
+    } else {
+      taut.push_back(i);
+    }
+  }
+  if (taut.empty()) return;
+  const bool all = taut.size() == recordings.size();
+  add_automatic(config,
+                slack_length_bounds(model.spec(), recordings[taut.front()], false, "slack_length"),
+                {{contact, all ? std::vector<std::size_t>{} : taut}});
+}
+
+/// Contact that is known, where each recording has its own.
+/// @param range travel of the recording from there
+AutomaticBounds held_contact(const LawSpec& law, double at, double range, std::string name) {
   return {{std::move(name), shown_unit(quantity_dimension(law.drive)), Scale::linear, at,
-           at - kHeld * range, at + kHeld * range},
+           at - kHeldWithin * range, at + kHeldWithin * range},
           std::nullopt};
+}
+
+/// A strain counts from where its recording starts: holds the contact of several whose columns
+/// start apart at each one's own start.
+void hold_strain_starts(FitConfig& config, std::size_t contact, const LawSpec& law,
+                        std::span<const PreparedRecording> recordings) {
+  constexpr double kApart = 1e-3;  // of the range
+  if (recordings.size() < 2) return;
+  const double first = recordings.front().recording.drive.front();
+  const auto range = [](const PreparedRecording& r) {
+    const auto [low, high] = std::ranges::minmax_element(r.recording.drive);
+    return *high - *low;
+  };
+  const bool apart = std::ranges::any_of(recordings, [&](const PreparedRecording& r) {
+    return std::abs(r.recording.drive.front() - first) > kApart * range(r);
+  });
+  if (!apart) return;
+  const double after = config.fixed[contact] - first;
+  for (std::size_t i = 0; i < recordings.size(); ++i) {
+    const PreparedRecording& r = recordings[i];
+    if (r.load_imposed) continue;
+    add_automatic(config,
+                  held_contact(law, r.recording.drive.front() + after, range(r),
+                               fmt::format("contact {}", r.name)),
+                  {{contact, {i}}});
+  }
 }
 
 }  // namespace
@@ -305,7 +363,7 @@ void add_placement(FitConfig& config, const LawModel& model,
       const bool pressed = is_indentation(law);
       if (pressed && !options.zero) hold_zero_of_load(config, model, r, scope);
       if (r.load_imposed ? options.contact.has_value() : options.zero.has_value()) continue;
-      add_free_placement(config, model, r, i, scope,
+      add_free_placement(config, model, r, scope,
                          named(pressed          ? "contact"
                                : r.load_imposed ? "strain_zero"
                                                 : "offset",
@@ -325,7 +383,9 @@ void add_placement(FitConfig& config, const LawModel& model,
     if (options.contact || options.nuisance == Nuisance::offset) {
       // fixed
     } else if (r.contact_held && several) {
-      add_automatic(config, held_contact(law, r, named("contact", r)), {{contact, scope}});
+      const double at = r.phases.contact_drive;
+      add_automatic(config, held_contact(law, at, r.phases.peak_drive - at, named("contact", r)),
+                    {{contact, scope}});
     } else if (!r.contact_held && free) {
       add_automatic(config,
                     contact_bounds(law, r, placement.onset, options.measured, named("contact", r)),
@@ -338,10 +398,27 @@ void add_placement(FitConfig& config, const LawModel& model,
     if (placement.drift == DriftFinding::told)
       add_drift(config, r, i, placement.rests, named("drift", r));
   }
+  const bool strain = law.drive == Quantity::strain && !recordings.front().load_imposed;
+  if (strain && !options.contact) hold_strain_starts(config, contact, law, recordings);
+  const bool slack = is_stretch(law) && !options.zero && options.nuisance != Nuisance::offset;
+  if (slack) add_slack_lengths(config, model, recordings);
   if (held == 0 || told > 0) return;
   for (EstimatedParameter& p : config.parameters) {
     if (p.fit.name == "k_inf") p.not_separable = Remark{kDriftOrBranch, "drift or a slow branch"};
   }
+}
+
+bool has_own_slack(const FitConfig& config) {
+  if (!config.law || config.law->drive != Quantity::relative_length) return false;
+  const std::size_t contact = LawModel(*config.law).index("contact");
+  return std::ranges::any_of(config.parameters, [contact](const EstimatedParameter& p) {
+    return p.sets.size() == 1 && p.sets.front().parameter == contact &&
+           !p.sets.front().data.empty();
+  });
+}
+
+bool is_held(const FitParameter& parameter, double travel) {
+  return parameter.upper - parameter.lower <= 4.0 * kHeldWithin * std::abs(travel);
 }
 
 }  // namespace tpm::fit

@@ -16,6 +16,7 @@
 #include "tpm/fit/select/fit_adequacy.hpp"
 #include "tpm/fit/select/gate.hpp"
 #include "tpm/fit/select/law_choice.hpp"
+#include "tpm/fit/select/placement_parameters.hpp"
 #include "tpm/fit/select/recording_setup.hpp"
 #include "tpm/fit/select/untold_noise.hpp"
 #include "tpm/work/give_up.hpp"
@@ -141,9 +142,10 @@ HeldOut predict_one(const Candidate& candidate, std::span<const PreparedRecordin
   const FitResult fit = run_fit(recording_config(candidate.law, others, setup), data_sets(others));
   HeldOut held;
   held.what = recordings[left_out].name;
-  const FitResult prediction =
-      fit_placement(candidate.law, model_parameters(fit.config, fit.best.natural, 0),
-                    recordings[left_out], setup);
+  const FitResult prediction = fit_placement(
+      candidate.law, model_parameters(fit.config, fit.best.natural, 0), recordings[left_out], setup,
+      has_own_slack(candidate.fit.config) ? FittedPlacement::slack_too
+                                          : FittedPlacement::offset_or_contact);
   const RecordingFit& r = prediction.recordings.front();
   held.rms = r.rms_residual;
   held.rms_over_peak = r.rms_residual / r.peak;
@@ -351,7 +353,7 @@ namespace {
 
 /// The laws to try: those that were asked for, or the classical family where it makes sense.
 std::vector<LawSpec> family_to_try(std::span<const PreparedRecording> recordings,
-                                 const SelectionOptions& options) {
+                                   const SelectionOptions& options) {
   std::vector<LawSpec> laws = options.laws.empty() ? classical_family() : options.laws;
   if (options.only_listed || recordings.empty()) return laws;
   const Quantity drive = law_drive(recordings.front().recording);
