@@ -165,7 +165,7 @@ void require_no_recession(const PreparedRecording& recording, std::span<const do
   const HeldLoad hold = held_load(load, load_noise);
   if (!hold.held) return;
   const auto after = answer.subspan(hold.from);
-  const std::size_t tenth = held.size() / 10;
+  const std::size_t tenth = after.size() / 10;
   const auto level = [&](std::size_t at) { return average_of(after.subspan(at, tenth)); };
   const double first = level(0), middle = level((after.size() - tenth) / 2),
                last = level(after.size() - tenth);
