@@ -190,7 +190,7 @@ std::string pulled_words(const FitResult& fit, const RecordingFit& r) {
 
 /// What tells of one recording that the law lacks some of its history.
 struct HistoryReader {
-  const char* code;  ///< of its remarks
+  const char* code;                                                   ///< of its remarks
   std::string (*words)(const FitResult& fit, const RecordingFit& r);  ///< empty: nothing is lacking
   const char* why;  ///< no parameter of the material is identified
 };

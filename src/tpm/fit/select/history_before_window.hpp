@@ -33,9 +33,9 @@ enum class History {
 /// @return true if a recording lacks it
 bool doubt_history(FitResult& fit, History lacking);
 
-/// History::unread of a law of known values that is compared with a recording: a remark of that code,
-/// where a load that was not read ended less than 5 times the longest relaxation time before the
-/// first compared sample. A response is seen beyond the noise of the recording, and contact is
+/// History::unread of a law of known values that is compared with a recording: a remark of that
+/// code, where a load that was not read ended less than 5 times the longest relaxation time before
+/// the first compared sample. A response is seen beyond the noise of the recording, and contact is
 /// where its own rows show it.
 /// @param values of all parameters of the law
 /// @param recording read from the file of its name
