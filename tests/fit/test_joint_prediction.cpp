@@ -58,23 +58,3 @@ TEST_CASE("strips with slack lengths of their own that are fitted together keep 
     CHECK(last.rms_residual < 0.004 * last.peak);  // noise of 0.2 % of the first peak
   }
 }
-
-TEST_CASE("strains whose columns start apart count from each one's own start", "[joint]") {
-  const LawSpec spec = test::spec_of("linear-1", Quantity::strain);
-  const std::vector<PreparedRecording> three = test::joint_recordings(spec, 3);
-  SetupOptions setup;
-  setup.starts = 6;
-  setup.profiles = false;
-  const FitResult fit = run_fit(recording_config(spec, three, setup), data_sets(three));
-  const LawFile law = fitted_law(fit);
-  REQUIRE(law.uncertainty);
-  const std::vector<FittedFile>& files = law.uncertainty->data;
-  REQUIRE(files.size() == 3);
-  for (std::size_t k = 1; k < 3; ++k) {
-    CAPTURE(k);
-    REQUIRE((files[k].contact && files[0].contact));
-    const double apart = *files[k].contact - *files[0].contact;
-    CHECK(std::abs(apart - 0.01 * static_cast<double>(k)) < 1e-5);
-    CHECK(std::ranges::find(files[k].held, "contact") != files[k].held.end());
-  }
-}

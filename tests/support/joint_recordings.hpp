@@ -56,8 +56,8 @@ inline double slack_length_of(int k) {
   return 1.0 + 0.03 * k;
 }
 
-/// Ramp and hold at rates, contacts (or slack lengths, or starts of the strain) and offsets of
-/// their own, with noise of 0.2 % of the first peak.
+/// Ramp and hold at rates, contacts (or slack lengths) and offsets of their own, with noise of 0.2 %
+/// of the first peak.
 inline std::vector<fit::PreparedRecording> joint_recordings(const LawSpec& spec, int count) {
   std::vector<fit::PreparedRecording> recordings;
   const bool stretch = spec.drive == Quantity::relative_length;
@@ -68,7 +68,7 @@ inline std::vector<fit::PreparedRecording> joint_recordings(const LawSpec& spec,
     r.drive_quantity = spec.drive;
     r.response_quantity = spec.response;
     r.header.sha256 = std::string(63, 'a') + std::to_string(k);
-    const double contact = stretch ? slack_length_of(k) : contact_force ? 1e-3 * (1 + k) : 0.01 * k;
+    const double contact = stretch ? slack_length_of(k) : contact_force ? 1e-3 * (1 + k) : 0.0;
     const double start = contact - (spec.drive == Quantity::strain ? 0.0 : 0.2 * spec.reference);
     for (int i = 0; i < 120; ++i) {
       const double t = 0.1 * i;

@@ -186,13 +186,9 @@ ReadingNoise reading_noise(const FitResult& fit) {
 
 /// Contact and offset of one of several recordings, which stand last in a law's parameters.
 void set_placement(FittedFile& file, const FitConfig& config, std::span<const double> values,
-                   const RecordingFit& recording) {
-  const std::size_t choice = recording.choice;
-  const auto [low, high] = std::ranges::minmax_element(recording.drive);
-  const double travel = *high - *low;
+                   std::size_t choice) {
   const auto estimated = [&](std::size_t parameter) {
     return std::ranges::any_of(config.parameters, [&](const EstimatedParameter& p) {
-      if (parameter == values.size() - 2 && is_held(p.fit, travel)) return false;
       return std::ranges::any_of(p.sets, [&](const Target& target) {
         return target.parameter == parameter && target.applies_to(choice);
       });
@@ -235,7 +231,7 @@ std::vector<FittedFile> fitted_files(const FitResult& fit) {
     for (const RecordingFit& r : fit.recordings) {
       if (r.choice != i) continue;
       if (fit.config.law && fit.config.data.size() > 1) {
-        set_placement(file, fit.config, model_parameters(fit.config, fit.best.natural, i), r);
+        set_placement(file, fit.config, model_parameters(fit.config, fit.best.natural, i), i);
       }
       set_drift(file, fit, i);
       set_rises(file, fit, i);

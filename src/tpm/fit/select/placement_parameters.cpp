@@ -7,6 +7,8 @@
 
 #include "tpm/base/quantity_text.hpp"
 #include "tpm/base/text.hpp"
+#include "tpm/data/contact_onset.hpp"
+#include "tpm/data/drive_pieces.hpp"
 #include "tpm/fit/likelihood/load_imposed.hpp"
 #include "tpm/fit/recording/placement.hpp"
 #include "tpm/fit/recording/unseen_rises.hpp"
@@ -38,10 +40,19 @@ bool contact_is_seen(const LawSpec& law, const PreparedRecording& r) {
   return !r.phases.preloaded && r.phases.contact_found && contact_s >= r.from_s;
 }
 
-/// True if a stretched strip is slack at first, and the recording shows where it becomes taut.
+/// True if a stretched strip is slack at first, and the recording shows where it becomes taut: its
+/// stress begins to rise after 2 % of the stretch or later.
 bool shows_slack(const PreparedRecording& r) {
-  return r.phases.contact_found && !r.phases.preloaded &&
-         r.recording.time_s[r.phases.contact_index] >= r.from_s;
+  constexpr double kCreeps = 0.01;  // part of the range that a still drive may creep
+  constexpr std::size_t kSustained = 5, kOfSamples = 8;
+  const Recording& read = r.recording;
+  const auto pieces =
+      data::drive_pieces(read.time_s, read.drive, r.phases.drive_jitter_sd, kCreeps);
+  const std::size_t most = std::max<std::size_t>(read.response.size() / kOfSamples, 1);
+  const data::Touch touch = data::find_touch(
+      {read.drive, read.response, pieces, r.phases.noise_sd_estimate, std::min(kSustained, most)},
+      std::nullopt);
+  return touch.index && !touch.instantaneous;
 }
 
 /// Part of the travel by which bounds leave a held parameter free.
@@ -54,8 +65,7 @@ constexpr double kFurthestContact = 2.0;
 /// tenths of the stretch; a strip that is taut from the start was slack no further back than a
 /// contact may lie, and not below a tenth of the length at the start. These bounds are not widened
 /// where a fit presses on them: a bend of the kernel from further away swallows a lack of fit.
-/// @param own this recording shows where it becomes taut: a threshold found that late
-AutomaticBounds slack_length_bounds(const LawSpec& law, const PreparedRecording& r, bool own,
+AutomaticBounds slack_length_bounds(const LawSpec& law, const PreparedRecording& r,
                                     std::string name) {
   constexpr double kMostOfStretch = 0.9, kShortest = 0.1;
   FitParameter fit;
@@ -67,7 +77,7 @@ AutomaticBounds slack_length_bounds(const LawSpec& law, const PreparedRecording&
   fit.lower = std::max(begin - kFurthestContact * range, kShortest * begin);
   fit.upper = begin + kMostOfStretch * range;
   // Under a straight kernel that was in contact from the start, depth and offset say the same.
-  if (!bends(law)) fit.lower = std::max(own ? fit.lower : begin, r.recording.drive.front());
+  if (!bends(law)) fit.lower = std::max(begin, r.recording.drive.front());
   fit.start = std::max(begin, fit.lower);
   return {readable(std::move(fit)), std::nullopt};
 }
@@ -256,18 +266,16 @@ void add_slack_lengths(FitConfig& config, const LawModel& model,
     const PreparedRecording& r = recordings[i];
     if (r.load_imposed) continue;
     if (several && shows_slack(r)) {
-      add_automatic(
-          config,
-          slack_length_bounds(model.spec(), r, true, fmt::format("slack_length {}", r.name)),
-          {{contact, {i}}});
+      add_automatic(config,
+                    slack_length_bounds(model.spec(), r, fmt::format("slack_length {}", r.name)),
+                    {{contact, {i}}});
     } else {
       taut.push_back(i);
     }
   }
   if (taut.empty()) return;
   const bool all = taut.size() == recordings.size();
-  add_automatic(config,
-                slack_length_bounds(model.spec(), recordings[taut.front()], false, "slack_length"),
+  add_automatic(config, slack_length_bounds(model.spec(), recordings[taut.front()], "slack_length"),
                 {{contact, all ? std::vector<std::size_t>{} : taut}});
 }
 
@@ -277,32 +285,6 @@ AutomaticBounds held_contact(const LawSpec& law, double at, double range, std::s
   return {{std::move(name), shown_unit(quantity_dimension(law.drive)), Scale::linear, at,
            at - kHeldWithin * range, at + kHeldWithin * range},
           std::nullopt};
-}
-
-/// A strain counts from where its recording starts: holds the contact of several whose columns
-/// start apart at each one's own start.
-void hold_strain_starts(FitConfig& config, std::size_t contact, const LawSpec& law,
-                        std::span<const PreparedRecording> recordings) {
-  constexpr double kApart = 1e-3;  // of the range
-  if (recordings.size() < 2) return;
-  const double first = recordings.front().recording.drive.front();
-  const auto range = [](const PreparedRecording& r) {
-    const auto [low, high] = std::ranges::minmax_element(r.recording.drive);
-    return *high - *low;
-  };
-  const bool apart = std::ranges::any_of(recordings, [&](const PreparedRecording& r) {
-    return std::abs(r.recording.drive.front() - first) > kApart * range(r);
-  });
-  if (!apart) return;
-  const double after = config.fixed[contact] - first;
-  for (std::size_t i = 0; i < recordings.size(); ++i) {
-    const PreparedRecording& r = recordings[i];
-    if (r.load_imposed) continue;
-    add_automatic(config,
-                  held_contact(law, r.recording.drive.front() + after, range(r),
-                               fmt::format("contact {}", r.name)),
-                  {{contact, {i}}});
-  }
 }
 
 }  // namespace
@@ -398,8 +380,6 @@ void add_placement(FitConfig& config, const LawModel& model,
     if (placement.drift == DriftFinding::told)
       add_drift(config, r, i, placement.rests, named("drift", r));
   }
-  const bool strain = law.drive == Quantity::strain && !recordings.front().load_imposed;
-  if (strain && !options.contact) hold_strain_starts(config, contact, law, recordings);
   const bool slack = is_stretch(law) && !options.zero && options.nuisance != Nuisance::offset;
   if (slack) add_slack_lengths(config, model, recordings);
   if (held == 0 || told > 0) return;
@@ -415,10 +395,6 @@ bool has_own_slack(const FitConfig& config) {
     return p.sets.size() == 1 && p.sets.front().parameter == contact &&
            !p.sets.front().data.empty();
   });
-}
-
-bool is_held(const FitParameter& parameter, double travel) {
-  return parameter.upper - parameter.lower <= 4.0 * kHeldWithin * std::abs(travel);
 }
 
 }  // namespace tpm::fit

@@ -41,8 +41,4 @@ void add_placement(FitConfig& config, const LawModel& model,
 /// True if recordings of a stretch that are fitted together have slack lengths of their own.
 [[nodiscard]] bool has_own_slack(const FitConfig& config);
 
-/// True if a parameter's bounds hold it where it was stated: the part of a recording's travel
-/// between them is negligible.
-[[nodiscard]] bool is_held(const FitParameter& parameter, double travel);
-
 }  // namespace tpm::fit
