@@ -61,7 +61,7 @@ struct NoiseOfEstimates {
 /// by at most (q/2) sum |d estimate / d reading|, which widens its interval.
 ///
 /// A drive that was rounded to coarse steps q (rounded_levels) has one error of variance q^2/12 for
-/// all readings of a level, which the law answers: the depth of a hold is off as a whole. The
+/// all readings of a hold, which the law answers: its depth is off as a whole. The
 /// covariance then has that of the changes of the estimates with such errors.
 ///
 /// @param natural the minimum, SI

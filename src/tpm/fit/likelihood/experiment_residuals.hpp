@@ -74,11 +74,12 @@ class ExperimentResiduals final : public ResidualFunction {
   [[nodiscard]] std::optional<Eigen::VectorXd> drive_noise_slope(
       std::span<const double> natural) const;
   /// Errors of drives that were rounded to coarse steps (rounded_levels): readings of one level
-  /// share one error, of variance q^2/12, which the law answers as if it were motion. Of 8 draws of
-  /// all these errors, what they add to the slope of half the sum of squares by the estimated
-  /// parameters, natural: the mean of their squares and products is the covariance of the slope.
-  /// The errors of a draw are +- one standard deviation, with signs that are uncorrelated over the
-  /// draws for the longest levels, the holds, and random for the others. Empty without such drives.
+  /// share one error (RoundedLevels::error_sd), which the law answers as if it were motion. Of 8
+  /// draws of all these errors, what they add to the slope of half the sum of squares by the
+  /// estimated parameters, natural: the mean of their squares and products is the covariance of the
+  /// slope. The errors of a draw are +- one standard deviation, with signs that are uncorrelated
+  /// over the draws for the longest levels, the holds, and random for the others. Empty without
+  /// such drives.
   [[nodiscard]] std::vector<Eigen::VectorXd> drive_rounding_slopes(
       std::span<const double> natural) const;
   /// A copy with at most about `most` samples of each recording, evenly taken from the history and

@@ -80,7 +80,8 @@ std::unique_ptr<ExperimentResiduals> ExperimentResiduals::with_other_rounding(
       // Rows of a Hadamard matrix: draws of the longest levels are uncorrelated with each other.
       const bool turned = std::popcount(draw & (rank % kDraws)) % 2 == 1;
       const bool up = turned != (random.below(2) == 1);
-      const double off = up ? rounded.error_sd() : -rounded.error_sd();
+      const double sd = rounded.error_sd(levels[rank], knots.size());
+      const double off = up ? sd : -sd;
       for (std::size_t i = levels[rank].first; i < levels[rank].end; ++i) knots[i].value += off;
     }
     return !levels.empty();

@@ -25,6 +25,13 @@ struct RoundedLevels {
 
   /// q / sqrt(12), of the error of a level.
   [[nodiscard]] double error_sd() const { return step / std::sqrt(12.0); }
+  /// The same of the mean error of a level among `count` readings: errors of n readings of a level
+  /// that a motion passes are spread evenly over the step, which leaves q / (n sqrt(12)).
+  [[nodiscard]] double error_sd(const RoundedLevel& level, std::size_t count) const {
+    constexpr std::size_t kHold = 20;  // parts of the readings: a level of one is no motion
+    const bool passed = kHold * level.size() <= count;
+    return error_sd() / (passed ? static_cast<double>(level.size()) : 1.0);
+  }
 };
 
 /// The steps of a drive that was rounded: its readings lie on a grid of at least 1e-4 of its range,
