@@ -241,6 +241,12 @@ TEST_CASE("a unit that is not known stops the import, and none is suggested") {
       fault("time [s],force [blob],depth [mm]\n"),
       Catch::Contains("column 2 'force': unknown unit 'blob'; expected --unit \"force=UNIT\" "
                       "with a unit of force"));
+  CHECK_THAT(fault("time [s],force [mV],depth [mm]\n"),
+             Catch::Contains("'mV' is a voltage, and the file has no calibration that makes it a "
+                             "force; expected a calibrated column") &&
+                 Catch::Contains("--unit \"force=N\""));
+  CHECK_THAT(fault("time [s],force [N],depth [V]\n"),
+             Catch::Contains("no calibration that makes it a length"));
   CHECK_THAT(fault("time,force,depth\ns,lbs,mm\n"), Catch::Contains("unknown unit 'lbs'"));
   CHECK_THAT(fault("time,force,stretch\n[s],[N],[pc]\n"), Catch::Contains("unknown unit 'pc'"));
   CHECK_THAT(fault("time [s],force (blob),depth [mm]\n"),

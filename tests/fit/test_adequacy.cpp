@@ -315,3 +315,28 @@ TEST_CASE("the grid of rounded readings is found", "[adequacy]") {
   const std::vector<double> same{1.0, 1.0, 1.0};
   CHECK(quantum_of(same) == 0.0);
 }
+
+TEST_CASE("a drive that was rounded is told from one that lies on a grid", "[rounded_drive]") {
+  const auto ramp_and_hold = [](double speed, double step) {
+    std::vector<double> drive;
+    for (int i = 0; i < 400; ++i) {
+      const double depth = std::clamp(speed * (i - 50), 0.0, 97.0 * speed);
+      drive.push_back(step > 0.0 ? step * std::round(depth / step) : depth);
+    }
+    return drive;
+  };
+  const RoundedLevels coarse = rounded_levels(ramp_and_hold(0.031, 0.1));
+  CHECK(coarse.step == Approx(0.1));
+  CHECK(coarse.error_sd() == Approx(0.1 / std::sqrt(12.0)));
+  REQUIRE(coarse.levels.size() == 31);  // 0 to 3.0
+  CHECK(coarse.levels.front().first == 0);
+  CHECK(coarse.levels.back().end == 400);
+  CHECK(coarse.levels.back().size() > 200);  // the hold
+  // Every reading of an exact ramp is another level.
+  CHECK(rounded_levels(ramp_and_hold(0.03, 0.0)).levels.empty());
+  // Finely written readings, and three stairs that were imposed.
+  CHECK(rounded_levels(ramp_and_hold(0.031, 1e-5)).levels.empty());
+  std::vector<double> stairs;
+  for (int i = 0; i < 400; ++i) stairs.push_back(std::floor(0.01 * i));
+  CHECK(rounded_levels(stairs).levels.empty());
+}

@@ -32,3 +32,27 @@ TEST_CASE("a law of several recordings has no placement for another", "[predict]
   CHECK_THROWS_WITH(predict_recording(law, other, options),
                     Catch::Contains("this is none of them"));
 }
+
+TEST_CASE("strips with slack lengths of their own that are fitted together keep them", "[joint]") {
+  for (const char* name : {"linear-1", "power-1"}) {
+    CAPTURE(name);
+    const LawSpec spec = test::spec_of(name, Quantity::relative_length);
+    const std::vector<PreparedRecording> strips = test::joint_recordings(spec, 3);
+    SetupOptions setup;
+    setup.starts = 6;
+    setup.profiles = false;
+    const FitResult fit = run_fit(recording_config(spec, strips, setup), data_sets(strips));
+    const LawFile law = fitted_law(fit);
+    REQUIRE(law.uncertainty);
+    const std::vector<FittedFile>& files = law.uncertainty->data;
+    REQUIRE(files.size() == 3);
+    for (int k = 0; k < 3; ++k) {
+      CAPTURE(k);
+      const FittedFile& file = files[static_cast<std::size_t>(k)];
+      REQUIRE(file.contact);
+      CHECK(std::abs(*file.contact - test::slack_length_of(k)) < 0.004);
+    }
+    const RecordingFit& last = fit.recordings.back();
+    CHECK(last.rms_residual < 0.004 * last.peak);  // noise of 0.2 % of the first peak
+  }
+}

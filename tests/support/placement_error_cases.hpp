@@ -45,6 +45,16 @@ inline std::string creep_recording() {
   return text;
 }
 
+/// A strain that goes on under a stress that is there from the first row on.
+inline std::string loaded_creep_recording() {
+  std::string text = "time [s],strain [%],stress [Pa]\n";
+  for (int i = 0; i <= 200; ++i) {
+    const double t = 0.1 * i;
+    text += fmt::format("{:.1f},{:.4f},100.0\n", t, 3.0 * (1.0 - std::exp(-0.2 * t)));
+  }
+  return text;
+}
+
 inline std::vector<ErrorCase> placement_error_cases() {
   const std::string type = "placement of a recording";
   const std::string config = R"({"title": "t", "law": {"name": "linear", "reference": "2 mm"},
@@ -95,6 +105,10 @@ inline std::vector<ErrorCase> placement_error_cases() {
            {{"g.csv", "time [s],gap [mm],force [N],sensor [mm]\n0,0,0,0\n1,1,1,2\n2,2,2,3\n"}})},
       {type, "force in grams", "fit {}/g.csv --no-draw -o {}/out",
        with_files({{"g.csv", "time [s],depth [mm],force [g]\n0,0,0\n1,1,1\n2,2,2\n"}})},
+      {type, "a voltage as a force", "fit {}/g.csv --no-draw -o {}/out",
+       with_files({{"g.csv", "time [s],depth [mm],force [mV]\n0,0,0\n1,1,1\n2,2,2\n"}})},
+      {type, "creep from after its load on", "fit {}/l.csv --no-draw -o {}/out",
+       with_files({{"l.csv", loaded_creep_recording()}})},
       {type, "a unit that may be two", "fit {}/g.csv --no-draw -o {}/out",
        with_files({{"g.csv", "time [s],depth [mm],force [MN]\n0,0,0\n1,1,1\n2,2,2\n"}})},
       {type, "minutes as metres", "fit {}/g.csv --no-draw -o {}/out",

@@ -2,8 +2,10 @@
 
 #include <algorithm>
 #include <cmath>
-#include <numeric>
+#include <span>
 #include <utility>
+
+#include "tpm/data/off_neighbours.hpp"
 
 namespace tpm::data {
 namespace {
@@ -166,23 +168,16 @@ class Pieces {
 double noise_sd(const std::vector<double>& time, const std::vector<double>& values,
                 std::size_t first, std::size_t last) {
   constexpr std::size_t kLeast = 8;
-  constexpr double kMedianToSd = 1.482602218505602;  // of a normal distribution
-  constexpr double kMeanToSd = 1.2533141373155003;
-  if (last - first + 1 < kLeast) return 0.0;
-  std::vector<double> residuals;
-  residuals.reserve(last - first - 1);
-  for (std::size_t i = first + 1; i < last; ++i) {
-    const double after = (time[i] - time[i - 1]) / (time[i + 1] - time[i - 1]);
-    const double before = 1.0 - after;
-    const double residual = values[i] - before * values[i - 1] - after * values[i + 1];
-    residuals.push_back(std::abs(residual) / std::sqrt(1.0 + before * before + after * after));
-  }
-  const auto middle = residuals.begin() + static_cast<std::ptrdiff_t>(residuals.size() / 2);
-  std::nth_element(residuals.begin(), middle, residuals.end());
-  if (*middle > 0.0) return kMedianToSd * *middle;
-  // Coarsely rounded values repeat, and more than half of the residuals are 0.
-  return kMeanToSd * std::accumulate(residuals.begin(), residuals.end(), 0.0) /
-         static_cast<double>(residuals.size());
+  constexpr double kMeanToSd = 1.2533141373155003;  // of a normal distribution
+  const std::size_t count = last - first + 1;
+  if (count < kLeast) return 0.0;
+  const std::vector<double> off = off_neighbours(std::span(time).subspan(first, count),
+                                                 std::span(values).subspan(first, count));
+  if (const double noise = noise_of(off); noise > 0.0) return noise;
+  // Coarsely rounded values repeat, and more than half of the distances are 0.
+  double sum = 0.0;
+  for (const double distance : off) sum += std::abs(distance);
+  return kMeanToSd * sum / static_cast<double>(off.size());
 }
 
 std::vector<DrivePiece> drive_pieces(const std::vector<double>& time,

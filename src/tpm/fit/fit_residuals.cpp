@@ -75,7 +75,9 @@ MultiStart run_starts(const ResidualFunction& function, std::span<const FitParam
   if (ends.empty()) {
     throw Error(
         ExitCode::numerical, "fit",
-        fmt::format("none of {} starts ended in a point that can be evaluated", starts.size()));
+        fmt::format("none of {} starts ended in a point that can be evaluated", starts.size()),
+        "another law (--laws), a window without what the law cannot follow (--from-time, --until), "
+        "or bounds (\"parameters\" of a configuration) within which the law predicts all readings");
   }
   std::ranges::stable_sort(ends, {}, [](const auto& end) { return end.first.deviance; });
   for (const auto& [m, count] : ends) add_to_cluster(result.minima, m, count);

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "tpm/fit/select/placement_parameters.hpp"
 #include "tpmkit/error.hpp"
 
 namespace tpm::fit {
@@ -77,6 +78,15 @@ bool is_of_one_recording(const LawSpec& spec, const LawParameter& parameter) {
          (parameter.name == "offset" || spec.drive != Quantity::relative_length);
 }
 
+/// Mean slack length of a strip's recordings, which may have their own.
+double mean_contact(const FitResult& fit, std::span<const double> natural, std::size_t place) {
+  double sum = 0.0;
+  for (std::size_t i = 0; i < fit.config.data.size(); ++i) {
+    sum += model_parameters(fit.config, natural, i)[place];
+  }
+  return sum / static_cast<double>(fit.config.data.size());
+}
+
 /// The law's parameters at values of the fit's, SI.
 std::vector<double> law_values(const FitResult& fit, const LawSpec& spec,
                                std::span<const double> natural) {
@@ -86,7 +96,11 @@ std::vector<double> law_values(const FitResult& fit, const LawSpec& spec,
   if (fit.config.data.size() == 1) return values;
   const std::vector<LawParameter> parameters = law_parameters(spec);
   for (std::size_t i = 0; i < parameters.size(); ++i) {
-    if (is_of_one_recording(spec, parameters[i])) values[i] = 0.0;
+    if (is_of_one_recording(spec, parameters[i])) {
+      values[i] = 0.0;
+    } else if (parameters[i].name == "contact" && has_own_slack(fit.config)) {
+      values[i] = mean_contact(fit, natural, i);
+    }
   }
   return values;
 }

@@ -15,31 +15,11 @@
 #include "tpm/fit/likelihood/correlation.hpp"
 #include "tpm/fit/likelihood/experiment_residuals.hpp"
 #include "tpm/fit/likelihood/quantum.hpp"
-#include "tpm/fit/measured_at_rest.hpp"
+#include "tpm/fit/noise_rows.hpp"
 #include "tpmkit/error.hpp"
 
 namespace tpm::fit {
 namespace {
-
-/// Rows of one recording among those of all residuals.
-struct RecordingRows {
-  Eigen::Index first = 0, count = 0;
-};
-
-/// The residuals of values, then those of priors.
-struct NoiseRows {
-  std::vector<double> time_s;  ///< recordings and separate readings far apart
-  Eigen::VectorXd residual;
-  Eigen::MatrixXd jacobian;          ///< by the free parameters, natural
-  Eigen::VectorXd half_step;         ///< of rounding, in units of the declared noise; of values
-  std::vector<double> prior_weight;  ///< of each prior's residual
-  std::vector<RecordingRows> recordings;
-  std::vector<std::optional<MeasuredAtRest>> at_rest;  ///< of each recording
-  double step_s = 0.0;
-
-  [[nodiscard]] Eigen::Index priors() const { return std::ssize(prior_weight); }
-  [[nodiscard]] Eigen::Index values() const { return residual.size() - priors(); }
-};
 
 bool has_plain_residuals(const ExperimentResiduals& function) {
   const FitConfig& config = function.config();
@@ -50,108 +30,6 @@ bool has_plain_residuals(const ExperimentResiduals& function) {
   }
   const Eigen::Index rows = function.value_count() + function.band_count() + prior_count(config);
   return function.residual_count() == rows;
-}
-
-/// Readings without rounding are all different.
-bool repeats_itself(std::vector<double> readings) {
-  constexpr double kShare = 0.2;
-  const auto n = static_cast<double>(readings.size());
-  std::ranges::sort(readings);
-  // clang 14 cannot read std::ranges::unique of libstdc++ 12.
-  const auto repeated =
-      std::distance(std::unique(readings.begin(), readings.end()), readings.end());
-  return static_cast<double>(repeated) > kShare * n;
-}
-
-/// Half the step that the readings of a recording are rounded to, on the scale of the noise.
-std::vector<double> half_steps(const ExperimentResiduals& function, const Experiment& experiment) {
-  std::vector<double> readings;
-  for (const std::size_t i : experiment.data) {
-    const FitDatum& d = function.data()[i];
-    if (!d.held_out && d.value) readings.push_back(*d.value);
-  }
-  const bool absolute = function.config().data[experiment.choice].noise.kind != NoiseKind::log;
-  const double half = absolute && repeats_itself(readings) ? 0.5 * quantum_of(readings) : 0.0;
-  std::vector<double> steps;
-  for (const std::size_t i : experiment.data) {
-    const FitDatum& d = function.data()[i];
-    if (!d.held_out && d.value) steps.push_back(half / d.sigma);
-  }
-  return steps;
-}
-
-double median_of(std::vector<double> values) {
-  if (values.empty()) return 1.0;
-  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-  std::nth_element(values.begin(), middle, values.end());
-  return *middle;
-}
-
-/// None if the residuals cannot be evaluated.
-std::optional<NoiseRows> noise_rows(const ExperimentResiduals& function,
-                                    std::span<const std::size_t> free,
-                                    std::span<const double> natural) {
-  constexpr double kApart = 1e5;  // steps between recordings: no correlation reaches so far
-  Eigen::VectorXd residual;
-  RowMatrix jacobian;
-  if (!function.evaluate(natural, residual, &jacobian)) return std::nullopt;
-  NoiseRows rows;
-  std::vector<Eigen::Index> kept;
-  std::vector<double> half, distances, own_time;
-  Eigen::Index row = 0;
-  for (const Experiment& experiment : function.experiments()) {
-    const Eigen::Index first = std::ssize(kept);
-    if (experiment.is_recording) {
-      const std::vector<double> steps = half_steps(function, experiment);
-      half.insert(half.end(), steps.begin(), steps.end());
-    }
-    for (const std::size_t i : experiment.data) {
-      const FitDatum& d = function.data()[i];
-      if (d.held_out) continue;
-      if (d.value) {
-        if (experiment.is_recording && std::ssize(kept) > first) {
-          distances.push_back(d.time_s - own_time.back());
-        }
-        kept.push_back(row);
-        own_time.push_back(d.time_s);
-        if (!experiment.is_recording) half.push_back(0.0);
-      }
-      ++row;
-    }
-    if (experiment.is_recording) rows.recordings.push_back({first, std::ssize(kept) - first});
-  }
-  if (std::ranges::any_of(distances, [](double d) { return !(d > 0.0); })) return std::nullopt;
-  rows.step_s = median_of(distances);
-  for (const Experiment& experiment : function.experiments()) {
-    if (!experiment.is_recording) continue;
-    rows.at_rest.push_back(measured_at_rest(function, experiment, rows.step_s));
-  }
-  const Eigen::Index values = std::ssize(kept);
-  for (; row < residual.size(); ++row) kept.push_back(row);
-  for (const EstimatedParameter& p : function.config().parameters) {
-    if (!p.prior) continue;
-    const auto place = &p - function.config().parameters.data();
-    const Eigen::Index at = kept[static_cast<std::size_t>(values + rows.priors())];
-    rows.prior_weight.push_back(jacobian(at, place) * p.prior->sd);
-  }
-  const std::vector<Eigen::Index> columns(free.begin(), free.end());
-  rows.residual = residual(kept);
-  rows.jacobian = jacobian(kept, columns);
-  rows.half_step = Eigen::VectorXd::Map(half.data(), std::ssize(half));
-  // Time goes on within a recording and leaps between what is independent.
-  double now = 0.0;
-  std::size_t recording = 0;
-  for (Eigen::Index i = 0; i < std::ssize(kept); ++i) {
-    while (recording < rows.recordings.size() &&
-           i >= rows.recordings[recording].first + rows.recordings[recording].count) {
-      ++recording;
-    }
-    const bool within = recording < rows.recordings.size() && i > rows.recordings[recording].first;
-    const auto k = static_cast<std::size_t>(i);
-    now += within ? own_time[k] - own_time[k - 1] : kApart * rows.step_s;
-    rows.time_s.push_back(now);
-  }
-  return rows;
 }
 
 /// R(phi) times columns.
@@ -359,7 +237,108 @@ Eigen::VectorXd bias_of_drive_noise(const ExperimentResiduals& function, const E
   return 0.5 * (moved + (there ? estimates.moved_by((*there)(columns)) : moved)).cwiseAbs();
 }
 
-std::string words_of(const NoiseOfEstimates& noise, bool by_drive, Eigen::Index samples) {
+/// Covariance by the rounding of drives, of scaled parameters (drive_rounding_slopes). Empty where
+/// it matters little.
+Eigen::MatrixXd covariance_of_drive_rounding(const ExperimentResiduals& function,
+                                             const Estimates& estimates,
+                                             const std::vector<std::size_t>& free,
+                                             std::span<const double> natural, double variance) {
+  constexpr double kMatters = 0.25;  // standard errors
+  const std::vector<Eigen::VectorXd> draws = function.drive_rounding_slopes(natural);
+  if (draws.empty()) return {};
+  const std::vector<Eigen::Index> columns(free.begin(), free.end());
+  const Eigen::Index p = estimates.length().size();
+  Eigen::MatrixXd covariance = Eigen::MatrixXd::Zero(p, p);
+  for (const Eigen::VectorXd& draw : draws) {
+    const Eigen::VectorXd moved = estimates.moved_by(draw(columns));
+    covariance += moved * moved.transpose() / static_cast<double>(draws.size());
+  }
+  const Eigen::ArrayXd square = kMatters * kMatters * variance * estimates.plain_variance();
+  if (!covariance.allFinite() || !(covariance.diagonal().array() > square).any()) return {};
+  return covariance;
+}
+
+/// What makes the estimates scatter beside independent noise of the readings, or biases them.
+struct NoiseParts {
+  AutoregressionEstimate autoregression;
+  bool correlated = false;
+  double phi = 0.0;
+  double size = 1.0;              ///< seen variance of a reading, in units of the declared one
+  double freedom = 1.0;           ///< readings less parameters
+  Eigen::VectorXd half_step;      ///< of rounded readings that limit the fit; 0 elsewhere
+  Eigen::VectorXd bias_of_drive;  ///< of scaled parameters
+  Eigen::MatrixXd by_rounding;    ///< covariance of scaled parameters by a rounded drive, or empty
+
+  [[nodiscard]] bool limited() const { return half_step.size() > 0 && half_step.maxCoeff() > 0.0; }
+  [[nodiscard]] bool biased() const { return bias_of_drive.maxCoeff() > 0.0; }
+  [[nodiscard]] bool rounded() const { return by_rounding.size() > 0; }
+  [[nodiscard]] bool any() const { return correlated || limited() || biased() || rounded(); }
+};
+
+/// Size and correlation of the noise of the readings alone.
+NoiseParts noise_of_readings(const NoiseRows& rows, bool scale_known, Eigen::Index parameters) {
+  constexpr double kSignificant = 5.41;  // chi-square of one degree, one-sided 1 %
+  NoiseParts parts;
+  const Correlation raw = correlation_of_rows(rows, rows.residual);
+  parts.autoregression = autoregression_of(rows, scale_known);
+  const AutoregressionEstimate& found = parts.autoregression;
+  const bool seen = raw.significant || found.gain > kSignificant;
+  parts.correlated = seen && (found.phi > 0.0 || raw.inflation() > 1.0);
+  parts.phi = parts.correlated ? found.phi : 0.0;
+  parts.freedom = static_cast<double>(rows.residual.size() - parameters);
+  parts.size = parts.correlated ? found.variance : rows.residual.squaredNorm() / parts.freedom;
+  const double square = parts.phi * parts.phi;
+  parts.half_step =
+      limiting_steps(rows, parts.size, parts.freedom * (1.0 - square) / (1.0 + square));
+  return parts;
+}
+
+/// Factor of variances for what an autoregression leaves of the correlation; at least 1.
+double left_beyond(const NoiseRows& rows, const AutoregressiveNoise& autoregression) {
+  Eigen::VectorXd white = rows.residual;
+  autoregression.whiten(rows.time_s, white);
+  const Correlation left = correlation_of_rows(rows, white);
+  return left.significant ? std::max(left.inflation(), 1.0) : 1.0;
+}
+
+/// Fills the covariance and what is told of each estimate.
+void set_estimates(NoiseOfEstimates& noise, const NoiseRows& rows, const Estimates& estimates,
+                   const NoiseParts& parts, bool scale_known) {
+  const double size = noise.variance * noise.beyond;
+  const Eigen::MatrixXd readings = size * estimates.by_readings(noise.phi);
+  Eigen::MatrixXd all = readings + estimates.by_priors() + estimates.by_rests(noise.phi, size);
+  if (parts.rounded()) all += parts.by_rounding;
+  const Eigen::VectorXd unscaled = estimates.length().cwiseInverse();
+  noise.covariance = unscaled.asDiagonal() * all * unscaled.asDiagonal();
+  // Derivatives of ln(variance) by phi, and by the size of the noise.
+  const AutoregressionEstimate& found = parts.autoregression;
+  const double step = 0.02 * (1.0 - noise.phi) + 1e-6;
+  const double below = std::max(noise.phi - step, 0.0), above = noise.phi + step;
+  const Eigen::VectorXd slope =
+      1.0 / (above - below) *
+          (size * (estimates.by_readings(above) - estimates.by_readings(below)) +
+           estimates.by_rests(above, size) - estimates.by_rests(below, size))
+              .diagonal() +
+      (scale_known ? 0.0 : found.log_squares_slope) * readings.diagonal();
+  const Eigen::VectorXd plain = estimates.plain_variance();
+  const Eigen::VectorXd bias = estimates.largest_bias(parts.half_step) + parts.bias_of_drive;
+  const auto n = static_cast<double>(rows.residual.size());
+  for (Eigen::Index k = 0; k < plain.size(); ++k) {
+    const double by_phi = noise.correlated ? slope[k] / all(k, k) : 0.0;
+    const double share = scale_known ? 0.0 : readings(k, k) / all(k, k);
+    const double spread =
+        by_phi * by_phi * found.phi_variance + share * share * 2.0 / parts.freedom;
+    constexpr double kMany = 1e6;
+    double degrees = spread > 2.0 / kMany ? 2.0 / spread : kMany;
+    if (noise.beyond > 1.0) {
+      degrees = std::min(degrees, n / noise.inflation - static_cast<double>(plain.size()));
+    }
+    noise.of[noise.free[static_cast<std::size_t>(k)]] = {
+        all(k, k) / plain[k], std::max(degrees, 1.0), bias[k] / std::sqrt(plain[k])};
+  }
+}
+
+std::string words_of(const NoiseOfEstimates& noise, const NoiseParts& parts, Eigen::Index samples) {
   std::string words;
   if (noise.correlated) {
     words = fmt::format(
@@ -372,9 +351,15 @@ std::string words_of(const NoiseOfEstimates& noise, bool by_drive, Eigen::Index 
                            significant(noise.beyond, 3));
     }
   }
-  if (by_drive) {
+  if (parts.biased()) {
     words += fmt::format(
         "{}the noise of the drive, which the law answers, biases estimates; intervals allow for it",
+        words.empty() ? "" : "; ");
+  }
+  if (parts.rounded()) {
+    words += fmt::format(
+        "{}the drive was rounded to coarse steps, and the law answers the errors; intervals count "
+        "them",
         words.empty() ? "" : "; ");
   }
   if (noise.limited) {
@@ -407,72 +392,28 @@ std::optional<NoiseOfEstimates> noise_of_estimates(const ExperimentResiduals& fu
   const Estimates estimates(*rows);
   if (!estimates.determined()) return std::nullopt;
 
-  constexpr double kSignificant = 5.41;  // chi-square of one degree, one-sided 1 %
   const bool scale_known = config.scale_known();
-  const Correlation raw = correlation_of_rows(*rows, rows->residual);
-  const AutoregressionEstimate found = autoregression_of(*rows, scale_known);
-  const bool seen = raw.significant || found.gain > kSignificant;
-  noise.correlated = seen && (found.phi > 0.0 || raw.inflation() > 1.0);
-  noise.phi = noise.correlated ? found.phi : 0.0;
-  noise.step_s = rows->step_s;
-  const AutoregressiveNoise autoregression(noise.phi, noise.step_s);
-  const auto n = static_cast<double>(rows->residual.size());
-  const double freedom = n - static_cast<double>(p);
-  const double seen_size =
-      noise.correlated ? found.variance : rows->residual.squaredNorm() / freedom;
-  if (!scale_known && seen_size < computed_variance(function)) return std::nullopt;
-  const double square = noise.phi * noise.phi;
-  const Eigen::VectorXd off =
-      limiting_steps(*rows, seen_size, freedom * (1.0 - square) / (1.0 + square));
-  noise.variance = scale_known ? 1.0 : seen_size;
-  const bool limited = off.size() > 0 && off.maxCoeff() > 0.0;
-  const Eigen::VectorXd bias_of_drive =
-      bias_of_drive_noise(function, estimates, parameters, noise.free, natural, seen_size);
-  const bool by_drive = bias_of_drive.maxCoeff() > 0.0;
-  if (!noise.correlated && !limited && !by_drive) return std::nullopt;
+  NoiseParts parts = noise_of_readings(*rows, scale_known, p);
+  if (!scale_known && parts.size < computed_variance(function)) return std::nullopt;
+  parts.bias_of_drive =
+      bias_of_drive_noise(function, estimates, parameters, noise.free, natural, parts.size);
+  parts.by_rounding =
+      covariance_of_drive_rounding(function, estimates, noise.free, natural, parts.size);
+  if (!parts.any()) return std::nullopt;
 
-  if (noise.correlated) {
-    Eigen::VectorXd white = rows->residual;
-    autoregression.whiten(rows->time_s, white);
-    const Correlation left = correlation_of_rows(*rows, white);
-    noise.beyond = left.significant ? std::max(left.inflation(), 1.0) : 1.0;
-  }
+  noise.correlated = parts.correlated;
+  noise.limited = parts.limited();
+  noise.phi = parts.phi;
+  noise.step_s = rows->step_s;
+  noise.variance = scale_known ? 1.0 : parts.size;
+  const AutoregressiveNoise autoregression(noise.phi, noise.step_s);
+  if (noise.correlated) noise.beyond = left_beyond(*rows, autoregression);
   const Eigen::MatrixXd ones = Eigen::VectorXd::Ones(rows->values());
   const double repeats = correlated_columns(autoregression, rows->time_s, ones).sum();
   noise.inflation = std::max(noise.beyond * repeats / static_cast<double>(rows->values()), 1.0);
-
-  const double size = noise.variance * noise.beyond;
-  const Eigen::MatrixXd readings = size * estimates.by_readings(noise.phi);
-  const Eigen::MatrixXd all =
-      readings + estimates.by_priors() + estimates.by_rests(noise.phi, size);
-  const Eigen::VectorXd unscaled = estimates.length().cwiseInverse();
-  noise.covariance = unscaled.asDiagonal() * all * unscaled.asDiagonal();
-  // Derivatives of ln(variance) by phi, and by the size of the noise.
-  const double step = 0.02 * (1.0 - noise.phi) + 1e-6;
-  const double below = std::max(noise.phi - step, 0.0), above = noise.phi + step;
-  const Eigen::VectorXd slope =
-      1.0 / (above - below) *
-          (size * (estimates.by_readings(above) - estimates.by_readings(below)) +
-           estimates.by_rests(above, size) - estimates.by_rests(below, size))
-              .diagonal() +
-      (scale_known ? 0.0 : found.log_squares_slope) * readings.diagonal();
-  const Eigen::VectorXd plain = estimates.plain_variance();
-  const Eigen::VectorXd bias = estimates.largest_bias(off) + bias_of_drive;
   noise.of.assign(parameters.size(), {});
-  for (Eigen::Index k = 0; k < p; ++k) {
-    const double by_phi = noise.correlated ? slope[k] / all(k, k) : 0.0;
-    const double share = scale_known ? 0.0 : readings(k, k) / all(k, k);
-    const double spread = by_phi * by_phi * found.phi_variance + share * share * 2.0 / freedom;
-    constexpr double kMany = 1e6;
-    double degrees = spread > 2.0 / kMany ? 2.0 / spread : kMany;
-    if (noise.beyond > 1.0) {
-      degrees = std::min(degrees, n / noise.inflation - static_cast<double>(p));
-    }
-    noise.of[noise.free[static_cast<std::size_t>(k)]] = {
-        all(k, k) / plain[k], std::max(degrees, 1.0), bias[k] / std::sqrt(plain[k])};
-  }
-  noise.limited = limited;
-  noise.summary = words_of(noise, by_drive, rows->values());
+  set_estimates(noise, *rows, estimates, parts, scale_known);
+  noise.summary = words_of(noise, parts, rows->values());
   return noise;
 }
 

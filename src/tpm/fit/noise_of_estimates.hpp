@@ -43,7 +43,7 @@ struct NoiseOfEstimates {
   std::vector<NoiseOfEstimate> of;  ///< of each parameter
   std::vector<std::size_t> free;    ///< parameters that are not at a bound
   Eigen::MatrixXd covariance;       ///< of those, in natural values
-  bool correlated = false;          ///< else rounding is all there is
+  bool correlated = false;          ///< else rounding, or noise of the drive, is all there is
   bool limited = false;             ///< by the resolution of the readings
   std::string summary;              ///< one sentence
 };
@@ -59,6 +59,10 @@ struct NoiseOfEstimates {
 /// called limited). The
 /// errors of rounding are then no noise: each is at most half a step, and so an estimate is biased
 /// by at most (q/2) sum |d estimate / d reading|, which widens its interval.
+///
+/// A drive that was rounded to coarse steps q (rounded_levels) has one error of variance q^2/12 for
+/// all readings of a hold, which the law answers: its depth is off as a whole. The
+/// covariance then has that of the changes of the estimates with such errors.
 ///
 /// @param natural the minimum, SI
 [[nodiscard]] std::optional<NoiseOfEstimates> noise_of_estimates(

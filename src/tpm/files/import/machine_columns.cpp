@@ -37,6 +37,33 @@ std::string unit_option(const MachineColumn& column, Dimension dimension) {
                      units.empty() ? "" : ": ", units);
 }
 
+namespace {
+
+/// Refuses a voltage: what a volt stands for is not in the file, and no unit is near to it.
+void refuse_voltage(const MachineColumn& column, Dimension dimension, const std::string& where,
+                    const std::string& name) {
+  constexpr std::array kVoltages{"V", "mV", "uV", "kV", "volt", "volts", "Volt", "Volts"};
+  if (std::ranges::find(kVoltages, column.unit) == kVoltages.end()) return;
+  const std::string_view quantity = dimension_name(dimension);
+  const Unit unit = shown_unit(dimension);
+  std::string expected = fmt::format(
+      "a calibrated column: multiply it by the {} per volt of the sensor, and state its unit, such "
+      "as --unit \"{}={}\"",
+      quantity, name, unit.symbol);
+  if (dimension == Dimension::force) {
+    expected +=
+        "; of a cantilever, title it Deflection and state --deflection-sensitivity and "
+        "--spring-constant";
+  }
+  throw bad_input(where,
+                  fmt::format("'{}' is a voltage, and the file has no calibration that makes it a "
+                              "{}",
+                              printable(column.unit), quantity),
+                  expected);
+}
+
+}  // namespace
+
 Unit unit_of(const MachineColumn& column, Dimension dimension, const std::string& file) {
   const std::string where = fmt::format("{}: {}", file, column.label());
   const std::string name =
@@ -65,6 +92,7 @@ Unit unit_of(const MachineColumn& column, Dimension dimension, const std::string
         where, fmt::format("'{}' is a unit of {}", printable(column.unit), dimension_name(other)),
         unit_option(column, dimension));
   }
+  refuse_voltage(column, dimension, where, name);
   const auto force = dimension == Dimension::force ? force_of_weight(column.unit) : std::nullopt;
   if (force) {
     throw bad_input(where, fmt::format("unknown unit '{}' of a force", printable(column.unit)),

@@ -131,7 +131,7 @@ SpecimenRow fit_specimen(const LawSpec& law, std::span<const PreparedRecording> 
     row.fit = run_fit(recording_config(law, one, setup), data_sets(one));
     const auto both = give_both_drift_answers(*row.fit, one);
     if (both) row.fit->remarks.push_back({"drift_not_separable", drift_words(*both, *row.fit)});
-    doubt_history(*row.fit);
+    doubt_history(*row.fit, History::unread);
     state_adequacy(*row.fit, one, rows);
     row.place = branches_by_time(law, *row.fit);
   });

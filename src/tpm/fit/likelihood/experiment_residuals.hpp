@@ -1,5 +1,6 @@
 #pragma once
 #include <cstdint>
+#include <functional>
 #include <memory>
 #include <optional>
 #include <string>
@@ -72,6 +73,15 @@ class ExperimentResiduals final : public ResidualFunction {
   /// as negative (probing: Tang and Saad 2012). Eight such answers make up the sum.
   [[nodiscard]] std::optional<Eigen::VectorXd> drive_noise_slope(
       std::span<const double> natural) const;
+  /// Errors of drives that were rounded to coarse steps (rounded_levels): readings of one level
+  /// share one error (RoundedLevels::error_sd), which the law answers as if it were motion. Of 8
+  /// draws of all these errors, what they add to the slope of half the sum of squares by the
+  /// estimated parameters, natural: the mean of their squares and products is the covariance of the
+  /// slope. The errors of a draw are +- one standard deviation, with signs that are uncorrelated
+  /// over the draws for the longest levels, the holds, and random for the others. Empty without
+  /// such drives.
+  [[nodiscard]] std::vector<Eigen::VectorXd> drive_rounding_slopes(
+      std::span<const double> natural) const;
   /// A copy with at most about `most` samples of each recording, evenly taken from the history and
   /// from the response: for the search of starts only.
   [[nodiscard]] std::unique_ptr<ExperimentResiduals> thinned(std::size_t most) const;
@@ -102,6 +112,12 @@ class ExperimentResiduals final : public ResidualFunction {
   };
 
   ExperimentResiduals() = default;
+  /// Moves the knots of an experiment's drive; false if it leaves them.
+  using MoveKnots = std::function<bool(const Experiment&, std::vector<Knot>&)>;
+  /// A copy with other drives of its recordings; null if none was moved.
+  [[nodiscard]] std::unique_ptr<ExperimentResiduals> with_moved_drives(const MoveKnots& move) const;
+  /// A copy with rounding errors of the drives; null if none was rounded.
+  [[nodiscard]] std::unique_ptr<ExperimentResiduals> with_other_rounding(std::size_t draw) const;
   /// A copy with that noise in every `every`-th sample from `first` on; null if there is none.
   [[nodiscard]] std::unique_ptr<ExperimentResiduals> with_noisier_drives(std::size_t first,
                                                                          std::size_t every) const;

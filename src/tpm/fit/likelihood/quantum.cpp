@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
 #include <vector>
 
 #include "tpm/base/distributions.hpp"
@@ -42,6 +43,34 @@ double hidden_noise_variance(double degrees) {
   constexpr double kFew = 0.5;  // few readings do not tell: half a step is the cautious answer
   const double counted = std::max(degrees, 1.0);
   return kOfHalfStep * std::max(chi_squared_quantile(kChance, counted) / counted, kFew);
+}
+
+RoundedLevels rounded_levels(std::span<const double> readings) {
+  constexpr double kCoarse = 1e-4;     // of the range
+  constexpr double kOneLevel = 0.5;    // of the step
+  constexpr std::size_t kHold = 20;    // parts of the readings: a level of one is no motion
+  constexpr std::size_t kFewest = 20;  // levels of a motion: fewer may be stairs that were imposed
+  constexpr double kOfSeveral = 0.2;   // of these levels
+  RoundedLevels rounded;
+  if (readings.empty()) return rounded;
+  const auto [low, high] = std::ranges::minmax_element(readings);
+  const double step = quantum_of(readings);
+  if (!(step >= kCoarse * (*high - *low))) return rounded;
+  std::vector<RoundedLevel> levels;
+  for (std::size_t i = 0; i < readings.size(); ++i) {
+    const bool next = i == 0 || std::abs(readings[i] - readings[i - 1]) > kOneLevel * step;
+    if (next) levels.push_back({i, i});
+    levels.back().end = i + 1;
+  }
+  std::size_t passed = 0, several = 0;
+  for (const RoundedLevel& level : levels) {
+    if (kHold * level.size() > readings.size()) continue;
+    ++passed;
+    several += level.size() > 1;
+  }
+  const bool stairs = static_cast<double>(several) >= kOfSeveral * static_cast<double>(passed);
+  if (passed < kFewest || !stairs) return rounded;
+  return {step, std::move(levels)};
 }
 
 double computed_variance(const ExperimentResiduals& function) {

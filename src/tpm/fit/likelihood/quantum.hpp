@@ -1,5 +1,8 @@
 #pragma once
+#include <cmath>
+#include <cstddef>
 #include <span>
+#include <vector>
 
 namespace tpm::fit {
 
@@ -12,6 +15,36 @@ class ExperimentResiduals;
 /// half a step by more than chance (5 %) explains. Rounding itself is a part of the variance.
 /// @param degrees independent readings behind the variance
 [[nodiscard]] double hidden_noise_variance(double degrees);
+
+/// Successive readings `first` to before `end` that were rounded to the same level.
+struct RoundedLevel {
+  std::size_t first = 0, end = 0;
+
+  [[nodiscard]] std::size_t size() const { return end - first; }
+};
+
+/// A drive that was rounded to coarse steps.
+struct RoundedLevels {
+  double step = 0.0;                 ///< q; 0: it was not
+  std::vector<RoundedLevel> levels;  ///< of all readings, in their order
+
+  /// q / sqrt(12), of the error of a level.
+  [[nodiscard]] double error_sd() const { return step / std::sqrt(12.0); }
+  /// The same of the mean error of a level among `count` readings: errors of n readings of a level
+  /// that a motion passes are spread evenly over the step, which leaves q / (n sqrt(12)).
+  [[nodiscard]] double error_sd(const RoundedLevel& level, std::size_t count) const {
+    constexpr std::size_t kHold = 20;  // parts of the readings: a level of one is no motion
+    const bool passed = kHold * level.size() <= count;
+    return error_sd() / (passed ? static_cast<double>(level.size()) : 1.0);
+  }
+};
+
+/// The steps of a drive that was rounded: its readings lie on a grid of at least 1e-4 of its range,
+/// and of at least 20 levels that it passes (each for less than a twentieth of the readings) at
+/// least a fifth hold several readings. Fewer may be stairs that were imposed; and a drive that
+/// passes another level with every reading need not be rounded, though it may lie on a grid, as an
+/// exact ramp does.
+[[nodiscard]] RoundedLevels rounded_levels(std::span<const double> readings);
 
 /// Relative error of a reading by computing: responses and minima are exact to about 1e-10, and no
 /// instrument reads nine digits.

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 #include <iterator>
+#include <limits>
 #include <utility>
 
 namespace tpm::fit {
@@ -168,6 +169,34 @@ std::vector<bool> linear_parameters(const ExperimentResiduals& function) {
   return linear;
 }
 
+/// Sum of squares; infinite where a start cannot be evaluated.
+double squares_at(const ResidualFunction& function, const std::vector<double>& start) {
+  Eigen::VectorXd residual;
+  const bool usable = function.evaluate(start, residual, nullptr);
+  const double squares = usable ? residual.squaredNorm() : std::numeric_limits<double>::infinity();
+  return std::isfinite(squares) ? squares : std::numeric_limits<double>::infinity();
+}
+
+/// Points of a Latin hypercube that come nearer to the data than every given start, nearest first:
+/// none, unless the search that gave those went astray.
+std::vector<std::vector<double>> nearer_starts(const ResidualFunction& function,
+                                               std::span<const FitParameter> parameters,
+                                               const std::vector<std::vector<double>>& given,
+                                               std::size_t count, std::uint64_t seed) {
+  double least = std::numeric_limits<double>::infinity();
+  for (const auto& start : given) least = std::min(least, squares_at(function, start));
+  std::vector<std::pair<double, std::vector<double>>> ranked;
+  for (auto& start : latin_hypercube_starts(parameters, count, seed)) {
+    const double squares = squares_at(function, start);
+    if (squares < least) ranked.emplace_back(squares, std::move(start));
+  }
+  std::ranges::stable_sort(ranked, [](const auto& a, const auto& b) { return a.first < b.first; });
+  if (ranked.size() > kFollowed) ranked.resize(kFollowed);
+  std::vector<std::vector<double>> starts;
+  for (auto& [squares, start] : ranked) starts.push_back(std::move(start));
+  return starts;
+}
+
 }  // namespace
 
 StartKind start_kind(const ExperimentResiduals& function) {
@@ -191,6 +220,9 @@ std::vector<std::vector<double>> fit_starts(const ExperimentResiduals& function,
   }
   if (std::ranges::find(linear, true) != linear.end()) {
     std::ranges::move(projected_starts(function, parameters, linear, count, kFollowed, config.seed),
+                      std::back_inserter(starts));
+  } else {
+    std::ranges::move(nearer_starts(function, parameters, starts, count, config.seed),
                       std::back_inserter(starts));
   }
   // Sorted, so that equal laws are seen to be equal.

@@ -33,7 +33,8 @@ enum class StartKind {
 
 /// The starts of a configuration: a Latin hypercube of all parameters, or, where the model is
 /// linear in some and the noise does not depend on it, projected starts; FitConfig::given_starts
-/// come before the latter and instead of the former.
+/// come before the latter and instead of the former, unless points of the hypercube come nearer to
+/// the data than all of them: these are then followed as well.
 [[nodiscard]] std::vector<std::vector<double>> fit_starts(const ExperimentResiduals& function,
                                                           std::span<const FitParameter> parameters);
 

@@ -20,11 +20,26 @@
 namespace tpm::fit {
 namespace {
 
+/// Leaves a parameter of the law out of what is uncertain of it.
+void leave_out(UncertainCoordinates& u, std::size_t place) {
+  const auto found = std::ranges::find(u.place, place);
+  if (found == u.place.end()) return;
+  const auto at = found - u.place.begin();
+  u.place.erase(found);
+  u.coordinate.erase(u.coordinate.begin() + at);
+  std::vector<Eigen::Index> kept;
+  for (Eigen::Index i = 0; i < u.root.rows(); ++i) {
+    if (i != at) kept.push_back(i);
+  }
+  u.root = Eigen::MatrixXd(u.root(kept, Eigen::all));
+}
+
 /// Adds the directions in which contact and offset of the recording move: with the material (they
 /// are found for it by least squares), and with the recording's own noise.
 void add_own_directions(UncertainCoordinates& u, const OwnPlacement& own, const Model& model,
                         const LawFile& law, const PreparedRecording& recording,
                         const Protocol& protocol) {
+  for (const std::size_t place : own.place) leave_out(u, place);  // of the law: it is found here
   if (own.place.empty()) return;
   const Recording& r = recording.recording;
   std::vector<double> times;
@@ -74,13 +89,24 @@ const FittedFile* fitted_file(const LawFile& law, const PreparedRecording& recor
   return found != data.end() ? &*found : nullptr;
 }
 
+/// True if recordings of a stretch were fitted together with slack lengths of their own: the law
+/// has their mean.
+bool has_own_slack(const LawFile& law) {
+  if (law.spec.drive != Quantity::relative_length || !law.uncertainty) return false;
+  const std::vector<FittedFile>& files = law.uncertainty->data;
+  return std::ranges::any_of(files, [&](const FittedFile& file) {
+    return file.contact && *file.contact != *files.front().contact;
+  });
+}
+
 /// The placement of one of several recordings that were fitted together.
 std::optional<OwnPlacement> placement_in_fit(const LawFile& law, const FittedFile* file) {
   if (file == nullptr || !file->contact || !file->offset) return std::nullopt;
   OwnPlacement own{law.values, {}};
   const std::vector<LawParameter> parameters = law_parameters(law.spec);
+  const bool own_slack = has_own_slack(law);
   for (std::size_t i = parameters.size() - 2; i < parameters.size(); ++i) {
-    if (!belongs_to_recording(law.spec, parameters[i])) continue;
+    if (!own_slack && !belongs_to_recording(law.spec, parameters[i])) continue;
     own.values[i] = parameters[i].name == "offset" ? *file->offset : *file->contact;
     if (std::ranges::find(file->held, parameters[i].name) == file->held.end()) {
       own.place.push_back(i);
@@ -199,7 +225,9 @@ OwnPlacement place_recording(const LawFile& law, const PreparedRecording& record
   setup.zero = held.zero;
   setup.reference = law.spec.reference;
   setup.profiles = false;
-  const FitResult fit = fit_placement(law.spec, law.values, recording, setup);
+  const FitResult fit = fit_placement(
+      law.spec, law.values, recording, setup,
+      has_own_slack(law) ? FittedPlacement::slack_too : FittedPlacement::offset_or_contact);
   OwnPlacement result{model_parameters(fit.config, fit.best.natural, 0), {}};
   for (const std::size_t free : fit.covariance.free) {
     const std::vector<Target>& sets = fit.config.parameters[free].sets;

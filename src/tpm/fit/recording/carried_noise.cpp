@@ -5,12 +5,32 @@
 #include <vector>
 
 #include "tpm/data/off_neighbours.hpp"
+#include "tpm/fit/likelihood/quantum.hpp"
 #include "tpm/fit/recording/motion_before_load.hpp"
 
 namespace tpm::fit {
 namespace {
 
 constexpr std::size_t kFewestCarried = 10;
+
+/// Mean variance of the rounding of fitted drive readings, where the noise at rest does not show
+/// it: a drive that rests stays on one level. Readings of a level that is held have one error,
+/// which no residual shows.
+double unseen_rounding(std::span<const double> drive, std::span<const double> fitted,
+                       double noise) {
+  constexpr std::size_t kHold = 20;  // parts of the readings
+  const RoundedLevels rounded = rounded_levels(drive);
+  const double variance = rounded.error_sd() * rounded.error_sd();
+  if (!(variance > noise)) return 0.0;
+  std::size_t moving = 0;
+  for (std::size_t i = 0; i < fitted.size();) {
+    std::size_t end = i + 1;
+    while (end < fitted.size() && std::abs(fitted[end] - fitted[i]) < 0.5 * rounded.step) ++end;
+    if (kHold * (end - i) <= fitted.size()) moving += end - i;
+    i = end;
+  }
+  return (variance - noise) * static_cast<double>(moving) / static_cast<double>(fitted.size());
+}
 
 }  // namespace
 
@@ -37,7 +57,8 @@ double carried_variance(const RecordingFit& fit, const Recording& recording, std
   for (const double off : rest) rest_squares += off * off;
   if (!(squares > 0.0)) return 0.0;
   const double stiffness = products / squares;
-  return stiffness * stiffness * rest_squares / static_cast<double>(rest.size());
+  const double noise = rest_squares / static_cast<double>(rest.size());
+  return stiffness * stiffness * (noise + unseen_rounding(recording.drive, imposed, noise));
 }
 
 }  // namespace tpm::fit

@@ -453,7 +453,7 @@ void state_adequacy(Selection& s, std::span<const PreparedRecording> recordings)
     if (!i) continue;
     Candidate& c = s.candidates[*i];
     doubt_placement(c.fit, recordings);
-    if (!doubt_history(c.fit) || !c.identified) continue;
+    if (!doubt_history(c.fit, History::unread) || !c.identified) continue;
     c.identified = false;
     c.reason = "history before the window is not in the fit";
   }
@@ -486,8 +486,8 @@ FitResult fit_and_judge(const FitProblem& problem) {
   const std::vector<DataSet> data = problem.data.empty() ? load_data(problem.config) : problem.data;
   FitResult fit = run_fit(problem.config, data);
   give_both_drift_answers(fit, data);
-  if (problem.data.empty()) doubt_history(fit);
-  doubt_pulled_history(fit);
+  if (problem.data.empty()) doubt_history(fit, History::unread);
+  doubt_history(fit, History::pulled);
   state_adequacy(fit, data);
   state_scatter(fit);
   repeat_choice(fit);

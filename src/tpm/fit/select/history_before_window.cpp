@@ -188,6 +188,20 @@ std::string pulled_words(const FitResult& fit, const RecordingFit& r) {
       significant(100.0 * pulled->most / r.peak, 3));
 }
 
+/// What tells of one recording that the law lacks some of its history.
+struct HistoryReader {
+  const char* code;                                                   ///< of its remarks
+  std::string (*words)(const FitResult& fit, const RecordingFit& r);  ///< empty: nothing is lacking
+  const char* why;  ///< no parameter of the material is identified
+};
+
+HistoryReader reader_of(History lacking) {
+  if (lacking == History::unread) {
+    return {kHistoryBeforeWindow, history_words, "history before the window is not in the fit"};
+  }
+  return {kPulledHistory, pulled_words, "the specimen pulls where the law has lost contact"};
+}
+
 /// Calls no parameter of the material identified.
 void doubt_material(FitResult& fit, const Remark& why) {
   for (ParameterResult& p : fit.parameters) {
@@ -228,29 +242,17 @@ std::optional<Remark> history_before_window(const LawSpec& law, std::span<const 
                             recording.import.step_time_s ? "--step-time" : "--from-time")};
 }
 
-bool doubt_history(FitResult& fit) {
+bool doubt_history(FitResult& fit, History lacking) {
   if (!fit.config.law) return false;
+  const HistoryReader reader = reader_of(lacking);
   std::vector<Remark> remarks;
   for (const RecordingFit& r : fit.recordings) {
-    std::string words = history_words(fit, r);
-    if (!words.empty()) remarks.push_back({kHistoryBeforeWindow, std::move(words)});
+    std::string words = reader.words(fit, r);
+    if (!words.empty()) remarks.push_back({reader.code, std::move(words)});
   }
   if (remarks.empty()) return false;
   std::ranges::move(remarks, std::back_inserter(fit.remarks));
-  doubt_material(fit, {kHistoryBeforeWindow, "history before the window is not in the fit"});
-  return true;
-}
-
-bool doubt_pulled_history(FitResult& fit) {
-  if (!fit.config.law) return false;
-  std::vector<Remark> remarks;
-  for (const RecordingFit& r : fit.recordings) {
-    std::string words = pulled_words(fit, r);
-    if (!words.empty()) remarks.push_back({kPulledHistory, std::move(words)});
-  }
-  if (remarks.empty()) return false;
-  std::ranges::move(remarks, std::back_inserter(fit.remarks));
-  doubt_material(fit, {kPulledHistory, "the specimen pulls where the law has lost contact"});
+  doubt_material(fit, {reader.code, reader.why});
   return true;
 }
 

@@ -10,8 +10,8 @@
 #include <utility>
 #include <vector>
 
-#include "tpm/base/median.hpp"
 #include "tpm/base/text.hpp"
+#include "tpm/data/off_neighbours.hpp"
 #include "tpm/fit/likelihood/load_imposed.hpp"
 #include "tpm/fit/likelihood/starts.hpp"
 #include "tpm/work/give_up.hpp"
@@ -29,19 +29,6 @@ double average_of(std::span<const double> values) {
   double sum = 0.0;
   for (const double v : values) sum += v;
   return sum / static_cast<double>(values.size());
-}
-
-/// Standard deviation of the noise, from samples against the line between their neighbours.
-double noise_of_channel(std::span<const double> time_s, std::span<const double> values) {
-  constexpr double kNormal = 0.6745;  // the median of |z|
-  std::vector<double> off;
-  for (std::size_t i = 1; i + 1 < values.size(); ++i) {
-    const double share = (time_s[i] - time_s[i - 1]) / (time_s[i + 1] - time_s[i - 1]);
-    const double line = values[i - 1] + share * (values[i + 1] - values[i - 1]);
-    const double scale = std::sqrt(1.0 + share * share + (1.0 - share) * (1.0 - share));
-    off.push_back(std::abs(values[i] - line) / scale);
-  }
-  return median(std::move(off)) / kNormal;
 }
 
 /// The part of a recording up to where the stress falls back.
@@ -82,6 +69,36 @@ bool crept(std::span<const double> load, std::span<const double> other, double o
   const double error = other_noise / std::sqrt(static_cast<double>(other.size() / 4));
   return by > std::max(kLeast * range_of(other), kSure * error) &&
          std::abs(moved(load)) / range_of(load) < kMuchLess * by / range_of(other);
+}
+
+/// Where a load reaches its largest value, and whether it stays there to its end.
+struct HeldLoad {
+  std::size_t from = 0;
+  bool held = false;
+};
+
+HeldLoad held_load(std::span<const double> load, double load_noise) {
+  constexpr double kStill = 0.005, kSure = 4.0;
+  constexpr std::size_t kFewest = 20;
+  const double least = *std::ranges::max_element(load) - 0.5 * kStill * range_of(load) -
+                       kSure * load_noise;  // of a load that is held
+  const auto reached = std::ranges::find_if(load, [&](double v) { return v >= least; });
+  const auto from = static_cast<std::size_t>(reached - load.begin());
+  const auto held = load.subspan(from);
+  const double within = kStill * range_of(load) + 2.0 * kSure * load_noise;
+  return {from, held.size() >= kFewest && range_of(held) <= within};
+}
+
+/// True if most of what the other channel moved by came after the load stood still: creep, also of
+/// a solid that came to rest under the load. (A force cell at its limit stands still, too, but for
+/// the last part of the motion only.)
+bool crept_to_rest(std::span<const double> load, double load_noise, std::span<const double> other,
+                   double other_noise) {
+  constexpr double kMost = 0.5, kSure = 8.0;
+  const HeldLoad hold = held_load(load, load_noise);
+  if (!hold.held) return false;
+  const double by = average_of(other.last((other.size() - hold.from) / 4)) - other[hold.from];
+  return by > std::max(kMost * range_of(other), kSure * other_noise);
 }
 
 /// Samples `first` to before `last` in which a channel stands still.
@@ -144,17 +161,11 @@ bool crept_on_stairs(std::span<const double> load, double load_noise, std::span<
 /// fall that the first half holds tells relaxation from a drift, which is straight.
 void require_no_recession(const PreparedRecording& recording, std::span<const double> load,
                           double load_noise, std::span<const double> answer, double answer_noise) {
-  constexpr double kStill = 0.005, kSure = 4.0, kFar = 0.1, kFirst = 0.6;
-  const double least = *std::ranges::max_element(load) - 0.5 * kStill * range_of(load) -
-                       kSure * load_noise;  // of a load that is held
-  const auto reached = std::ranges::find_if(load, [&](double v) { return v >= least; });
-  const auto peak = static_cast<std::size_t>(reached - load.begin());
-  const auto held = load.subspan(peak);
-  const auto after = answer.subspan(peak);
-  constexpr std::size_t kFewest = 20;
-  if (held.size() < kFewest) return;
-  if (range_of(held) > kStill * range_of(load) + 2.0 * kSure * load_noise) return;
-  const std::size_t tenth = held.size() / 10;
+  constexpr double kSure = 4.0, kFar = 0.1, kFirst = 0.6;
+  const HeldLoad hold = held_load(load, load_noise);
+  if (!hold.held) return;
+  const auto after = answer.subspan(hold.from);
+  const std::size_t tenth = after.size() / 10;
   const auto level = [&](std::size_t at) { return average_of(after.subspan(at, tenth)); };
   const double first = level(0), middle = level((after.size() - tenth) / 2),
                last = level(after.size() - tenth);
@@ -266,8 +277,8 @@ std::optional<Channels> channels_of(const Recording& r) {
              std::span(r.response).first(end)};
   c.stretched = stretched;
   if (!(range_of(c.answer) > 0.0 && range_of(c.load) > 0.0)) return std::nullopt;
-  c.answer_noise = noise_of_channel(c.time, c.answer);
-  c.load_noise = noise_of_channel(c.time, c.load);
+  c.answer_noise = data::noise_about_neighbours(c.time, c.answer);
+  c.load_noise = data::noise_about_neighbours(c.time, c.load);
   return c;
 }
 
@@ -305,8 +316,35 @@ std::optional<Remark> imposed_channel_remark(const std::string& name, const Reco
               : fmt::format(" and compares the {}", answer))};
 }
 
+namespace {
+
+/// Refuses creep that was recorded from after the load: how the strain began is in no sample.
+void require_begin_of_creep(const PreparedRecording& recording) {
+  constexpr double kStill = 0.005, kMost = 0.5, kSure = 8.0;
+  constexpr std::size_t kFewest = 20;
+  const Recording& r = recording.recording;
+  if (r.drive_quantity != Quantity::strain || r.response_quantity != Quantity::stress) return;
+  if (r.drive.size() != r.response.size() || r.time_s.size() != r.drive.size()) return;
+  const std::size_t end = end_of_load(r.response);
+  if (end < kFewest) return;
+  const auto load = std::span(r.response).first(end), strain = std::span(r.drive).first(end);
+  const double level = average_of(load);
+  if (!(level > 0.0) || range_of(load) > kStill * level) return;
+  const double noise = data::noise_about_neighbours(std::span(r.time_s).first(end), strain);
+  const double by = average_of(strain.last(end / 4)) - strain.front();
+  if (!(by > std::max(kMost * range_of(strain), kSure * noise))) return;
+  throw bad_input(
+      fmt::format("recording '{}'", recording.name),
+      "the stress is the same from the first sample on while the strain goes on: creep without the "
+      "samples before its load",
+      "the recording from before the load on: one row without a stress is enough");
+}
+
+}  // namespace
+
 void find_imposed_channel(PreparedRecording& recording) {
   constexpr double kMuchLess = 3.0;  // times less noise, in parts of the range
+  require_begin_of_creep(recording);
   const Recording& r = recording.recording;
   const std::optional<Channels> c = channels_of(r);
   if (!c) return;
@@ -317,7 +355,9 @@ void find_imposed_channel(PreparedRecording& recording) {
       c->stretched && crept_on_stairs(c->load, c->load_noise, c->answer, c->answer_noise);
   const bool held = was_held(c->load, c->load_noise, c->answer, c->answer_noise) &&
                     (c->of_answer() > kMuchLess * c->of_load() || slower);
-  const bool imposed = held || stairs;
+  const bool rested = c->stretched && c->of_answer() >= c->of_load() &&
+                      crept_to_rest(c->load, c->load_noise, c->answer, c->answer_noise);
+  const bool imposed = held || stairs || rested;
   if (auto remark = imposed_channel_remark(recording.name, r, imposed)) {
     recording.remarks.push_back(*std::move(remark));
   }

@@ -7,6 +7,8 @@
 
 #include "tpm/base/quantity_text.hpp"
 #include "tpm/base/text.hpp"
+#include "tpm/data/contact_onset.hpp"
+#include "tpm/data/drive_pieces.hpp"
 #include "tpm/fit/likelihood/load_imposed.hpp"
 #include "tpm/fit/recording/placement.hpp"
 #include "tpm/fit/recording/unseen_rises.hpp"
@@ -38,6 +40,24 @@ bool contact_is_seen(const LawSpec& law, const PreparedRecording& r) {
   return !r.phases.preloaded && r.phases.contact_found && contact_s >= r.from_s;
 }
 
+/// True if a stretched strip is slack at first, and the recording shows where it becomes taut: its
+/// stress begins to rise after 2 % of the stretch or later.
+bool shows_slack(const PreparedRecording& r) {
+  constexpr double kCreeps = 0.01;  // part of the range that a still drive may creep
+  constexpr std::size_t kSustained = 5, kOfSamples = 8;
+  const Recording& read = r.recording;
+  const auto pieces =
+      data::drive_pieces(read.time_s, read.drive, r.phases.drive_jitter_sd, kCreeps);
+  const std::size_t most = std::max<std::size_t>(read.response.size() / kOfSamples, 1);
+  const data::Touch touch = data::find_touch(
+      {read.drive, read.response, pieces, r.phases.noise_sd_estimate, std::min(kSustained, most)},
+      std::nullopt);
+  return touch.index && !touch.instantaneous;
+}
+
+/// Part of the travel by which bounds leave a held parameter free.
+constexpr double kHeldWithin = 1e-6;
+
 /// Contact may lie this many times the depth of the recording before its start at most.
 constexpr double kFurthestContact = 2.0;
 
@@ -45,10 +65,11 @@ constexpr double kFurthestContact = 2.0;
 /// tenths of the stretch; a strip that is taut from the start was slack no further back than a
 /// contact may lie, and not below a tenth of the length at the start. These bounds are not widened
 /// where a fit presses on them: a bend of the kernel from further away swallows a lack of fit.
-AutomaticBounds slack_length_bounds(const LawSpec& law, const PreparedRecording& r) {
+AutomaticBounds slack_length_bounds(const LawSpec& law, const PreparedRecording& r,
+                                    std::string name) {
   constexpr double kMostOfStretch = 0.9, kShortest = 0.1;
   FitParameter fit;
-  fit.name = "slack_length";
+  fit.name = std::move(name);
   fit.scale = Scale::linear;
   fit.unit = shown_unit(quantity_dimension(law.drive));
   const double begin = start_drive(r);
@@ -221,7 +242,7 @@ void take_level_before_load(FitConfig& config, const PreparedRecording& r) {
 /// Zero and contact of recordings that are no indentations, and of creep: nothing is measured
 /// beforehand but the force before it rises.
 void add_free_placement(FitConfig& config, const LawModel& model, const PreparedRecording& r,
-                        std::size_t i, std::vector<std::size_t> scope, std::string offset,
+                        const std::vector<std::size_t>& scope, std::string offset,
                         const SetupOptions& options) {
   const LawSpec& law = model.spec();
   if (r.load_imposed) {
@@ -232,18 +253,37 @@ void add_free_placement(FitConfig& config, const LawModel& model, const Prepared
   }
   add_automatic(config, offset_bounds(law, r, std::move(offset)), {{model.index("offset"), scope}});
   if (options.measured) take_level_before_load(config, r);
-  // The slack length belongs to the specimen.
-  const bool slack = is_stretch(law) && i == 0 && options.nuisance != Nuisance::offset;
-  if (slack) add_automatic(config, slack_length_bounds(law, r), {{model.index("contact"), {}}});
 }
 
-/// Contact that is known from a stated force, where each recording has its own.
-AutomaticBounds held_contact(const LawSpec& law, const PreparedRecording& r, std::string name) {
-  constexpr double kHeld = 1e-6;  // of the travel
-  const double at = r.phases.contact_drive;
-  const double range = r.phases.peak_drive - at;
+/// Slack lengths of a stretch: one of each of several recordings that show it (the strip may have
+/// been gripped again, or be another one), and one for all others, which do not.
+void add_slack_lengths(FitConfig& config, const LawModel& model,
+                       std::span<const PreparedRecording> recordings) {
+  const std::size_t contact = model.index("contact");
+  const bool several = recordings.size() > 1;
+  std::vector<std::size_t> taut;
+  for (std::size_t i = 0; i < recordings.size(); ++i) {
+    const PreparedRecording& r = recordings[i];
+    if (r.load_imposed) continue;
+    if (several && shows_slack(r)) {
+      add_automatic(config,
+                    slack_length_bounds(model.spec(), r, fmt::format("slack_length {}", r.name)),
+                    {{contact, {i}}});
+    } else {
+      taut.push_back(i);
+    }
+  }
+  if (taut.empty()) return;
+  const bool all = taut.size() == recordings.size();
+  add_automatic(config, slack_length_bounds(model.spec(), recordings[taut.front()], "slack_length"),
+                {{contact, all ? std::vector<std::size_t>{} : taut}});
+}
+
+/// Contact that is known, where each recording has its own.
+/// @param range travel of the recording from there
+AutomaticBounds held_contact(const LawSpec& law, double at, double range, std::string name) {
   return {{std::move(name), shown_unit(quantity_dimension(law.drive)), Scale::linear, at,
-           at - kHeld * range, at + kHeld * range},
+           at - kHeldWithin * range, at + kHeldWithin * range},
           std::nullopt};
 }
 
@@ -305,7 +345,7 @@ void add_placement(FitConfig& config, const LawModel& model,
       const bool pressed = is_indentation(law);
       if (pressed && !options.zero) hold_zero_of_load(config, model, r, scope);
       if (r.load_imposed ? options.contact.has_value() : options.zero.has_value()) continue;
-      add_free_placement(config, model, r, i, scope,
+      add_free_placement(config, model, r, scope,
                          named(pressed          ? "contact"
                                : r.load_imposed ? "strain_zero"
                                                 : "offset",
@@ -325,7 +365,9 @@ void add_placement(FitConfig& config, const LawModel& model,
     if (options.contact || options.nuisance == Nuisance::offset) {
       // fixed
     } else if (r.contact_held && several) {
-      add_automatic(config, held_contact(law, r, named("contact", r)), {{contact, scope}});
+      const double at = r.phases.contact_drive;
+      add_automatic(config, held_contact(law, at, r.phases.peak_drive - at, named("contact", r)),
+                    {{contact, scope}});
     } else if (!r.contact_held && free) {
       add_automatic(config,
                     contact_bounds(law, r, placement.onset, options.measured, named("contact", r)),
@@ -338,10 +380,21 @@ void add_placement(FitConfig& config, const LawModel& model,
     if (placement.drift == DriftFinding::told)
       add_drift(config, r, i, placement.rests, named("drift", r));
   }
+  const bool slack = is_stretch(law) && !options.zero && options.nuisance != Nuisance::offset;
+  if (slack) add_slack_lengths(config, model, recordings);
   if (held == 0 || told > 0) return;
   for (EstimatedParameter& p : config.parameters) {
     if (p.fit.name == "k_inf") p.not_separable = Remark{kDriftOrBranch, "drift or a slow branch"};
   }
+}
+
+bool has_own_slack(const FitConfig& config) {
+  if (!config.law || config.law->drive != Quantity::relative_length) return false;
+  const std::size_t contact = LawModel(*config.law).index("contact");
+  return std::ranges::any_of(config.parameters, [contact](const EstimatedParameter& p) {
+    return p.sets.size() == 1 && p.sets.front().parameter == contact &&
+           !p.sets.front().data.empty();
+  });
 }
 
 }  // namespace tpm::fit

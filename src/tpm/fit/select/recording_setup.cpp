@@ -479,17 +479,20 @@ bool belongs_to_recording(const LawSpec& spec, const LawParameter& parameter) {
 }
 
 FitResult fit_placement(const LawSpec& law, std::span<const double> values,
-                        const PreparedRecording& recording, const SetupOptions& setup) {
+                        const PreparedRecording& recording, const SetupOptions& setup,
+                        FittedPlacement what) {
   FitConfig config = recording_config(law, std::span(&recording, 1), setup);
   const std::vector<LawParameter> parameters = law_parameters(law);
+  const auto is_fitted = [&](const LawParameter& p) {
+    return what == FittedPlacement::slack_too ? p.nuisance : belongs_to_recording(law, p);
+  };
   std::erase_if(config.parameters, [&](const EstimatedParameter& p) {
-    const bool own =
-        p.drift.has_value() || p.rise.has_value() ||
-        (p.sets.size() == 1 && belongs_to_recording(law, parameters[p.sets.front().parameter]));
+    const bool own = p.drift.has_value() || p.rise.has_value() ||
+                     (p.sets.size() == 1 && is_fitted(parameters[p.sets.front().parameter]));
     return !own;
   });
   for (std::size_t i = 0; i < parameters.size(); ++i) {
-    if (!belongs_to_recording(law, parameters[i])) config.fixed[i] = values[i];
+    if (!is_fitted(parameters[i])) config.fixed[i] = values[i];
   }
   return run_fit(config, data_sets(std::span(&recording, 1)));
 }

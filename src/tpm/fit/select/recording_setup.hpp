@@ -79,13 +79,20 @@ struct SetupOptions {
 /// The configuration file that tpm fit reads, with the same meaning.
 [[nodiscard]] Json config_json(const FitConfig& config);
 
-/// The slack length of a strip belongs to the specimen: it stays, as in select_law.
+/// Offset, and contact of an indentation. The slack length of a strip belongs to the specimen,
+/// unless recordings that were fitted together have their own (has_own_slack()).
 [[nodiscard]] bool belongs_to_recording(const LawSpec& spec, const LawParameter& parameter);
+
+/// What is fitted of a recording beside a given material.
+enum class FittedPlacement {
+  offset_or_contact,  ///< belongs_to_recording
+  slack_too,          ///< the slack length of a strip as well
+};
 
 /// Fits what belongs to a recording, with the parameters of the material as given.
 /// @param values of the whole law
 [[nodiscard]] FitResult fit_placement(const LawSpec& law, std::span<const double> values,
-                                      const PreparedRecording& recording,
-                                      const SetupOptions& setup);
+                                      const PreparedRecording& recording, const SetupOptions& setup,
+                                      FittedPlacement what = FittedPlacement::offset_or_contact);
 
 }  // namespace tpm::fit

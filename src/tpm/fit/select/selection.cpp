@@ -16,6 +16,7 @@
 #include "tpm/fit/select/fit_adequacy.hpp"
 #include "tpm/fit/select/gate.hpp"
 #include "tpm/fit/select/law_choice.hpp"
+#include "tpm/fit/select/placement_parameters.hpp"
 #include "tpm/fit/select/recording_setup.hpp"
 #include "tpm/fit/select/untold_noise.hpp"
 #include "tpm/work/give_up.hpp"
@@ -141,9 +142,10 @@ HeldOut predict_one(const Candidate& candidate, std::span<const PreparedRecordin
   const FitResult fit = run_fit(recording_config(candidate.law, others, setup), data_sets(others));
   HeldOut held;
   held.what = recordings[left_out].name;
-  const FitResult prediction =
-      fit_placement(candidate.law, model_parameters(fit.config, fit.best.natural, 0),
-                    recordings[left_out], setup);
+  const FitResult prediction = fit_placement(
+      candidate.law, model_parameters(fit.config, fit.best.natural, 0), recordings[left_out], setup,
+      has_own_slack(candidate.fit.config) ? FittedPlacement::slack_too
+                                          : FittedPlacement::offset_or_contact);
   const RecordingFit& r = prediction.recordings.front();
   held.rms = r.rms_residual;
   held.rms_over_peak = r.rms_residual / r.peak;
@@ -347,19 +349,96 @@ void rank_candidates(Selection& s, bool few_readings) {
   s.recommended = least_within(s.candidates, s.margin);
 }
 
+namespace {
+
+/// The laws to try: those that were asked for, or the classical family where it makes sense.
+std::vector<LawSpec> family_to_try(std::span<const PreparedRecording> recordings,
+                                   const SelectionOptions& options) {
+  std::vector<LawSpec> laws = options.laws.empty() ? classical_family() : options.laws;
+  if (options.only_listed || recordings.empty()) return laws;
+  const Quantity drive = law_drive(recordings.front().recording);
+  if (!is_answered_by_stress(drive)) return laws;
+  // Hertz is the contact of a ball, tension that of lateral neighbours.
+  const bool strain = drive == Quantity::strain;
+  std::erase_if(laws, [strain](const LawSpec& law) {
+    return law.kernel == Kernel::hertz || (strain && law.tension != Tension::none);
+  });
+  return laws;
+}
+
+/// Samples, and how many of them are independent, from the law that comes closest: its residuals
+/// are the nearest to noise alone. Throws Error(numerical) if no law could be fitted.
+void count_samples(Selection& s, std::size_t laws) {
+  const Candidate* closest = nullptr;
+  for (const Candidate& c : s.candidates) {
+    if (c.failed) continue;
+    if (closest == nullptr || c.fit.best.deviance < closest->fit.best.deviance) closest = &c;
+  }
+  if (closest == nullptr) {
+    throw Error(
+        ExitCode::numerical, "selection",
+        fmt::format("none of {} laws could be fitted: {}", laws, s.candidates.front().reason));
+  }
+  s.samples = closest->fit.value_count;
+  s.correlation = correlation_of(closest->fit);
+  s.effective_count = s.correlation.effective_count;
+}
+
+void predict_held_out(Selection& s, std::span<const PreparedRecording> recordings,
+                      const SelectionOptions& options) {
+  Progress predicting("predicting what was held out", s.candidates.size());
+  for (Candidate& c : s.candidates) {
+    hold_out(c, recordings, options);
+    predicting.advance();
+  }
+  if (!s.candidates.front().held_out.empty()) return;
+  s.remarks.push_back(
+      {"nothing_held_out",
+       fmt::format("nothing was held out: the second half of the hold has fewer than {} samples",
+                   kFewestPredicted)});
+}
+
+/// Both answers of the recommended and the preferred law where a drift cannot be told from a slow
+/// branch.
+void add_drift_answers(Selection& s, std::span<const PreparedRecording> recordings) {
+  FitResult& chosen = s.candidates[s.recommended].fit;
+  s.drift = give_both_drift_answers(chosen, recordings);
+  if (s.drift) chosen.remarks.push_back({"drift_not_separable", drift_words(*s.drift, chosen)});
+  if (!s.preferred) return;
+  FitResult& preferred = s.candidates[*s.preferred].fit;
+  const auto both = give_both_drift_answers(preferred, recordings);
+  if (both) preferred.remarks.push_back({"drift_not_separable", drift_words(*both, preferred)});
+}
+
+void add_remarks(Selection& s, std::span<const PreparedRecording> recordings) {
+  const FitResult& chosen = s.candidates[s.recommended].fit;
+  const auto warn = [&s](std::vector<Remark> more) {
+    std::ranges::move(more, std::back_inserter(s.remarks));
+  };
+  warn(recording_remarks(recordings));
+  warn(protocol_remarks(chosen, recordings));
+  warn(outside_remarks(chosen));
+}
+
+/// What was done to the recordings before the fit.
+void describe_recordings(Selection& s, std::span<const PreparedRecording> recordings,
+                         const SelectionOptions& options) {
+  for (const PreparedRecording& r : recordings) {
+    if (!r.start_up.empty()) s.summary.push_back(r.start_up);
+    if (std::string rises = unseen_rise_words(r); !rises.empty()) s.summary.push_back(rises);
+    if (options.setup.contact) continue;
+    std::string jump = contact_in_jump_words(r, s.candidates[s.recommended].fit.config);
+    if (!jump.empty()) s.summary.push_back(std::move(jump));
+  }
+}
+
+}  // namespace
+
 Selection select_law(std::span<const PreparedRecording> recordings,
                      const SelectionOptions& wanted) {
   SelectionOptions options = wanted;
   options.setup.placements = std::make_shared<PlacementMemory>();
-  std::vector<LawSpec> laws = options.laws.empty() ? classical_family() : options.laws;
-  if (!options.only_listed && !recordings.empty() &&
-      is_answered_by_stress(law_drive(recordings.front().recording))) {
-    // Hertz is the contact of a ball, tension that of lateral neighbours.
-    const bool strain = law_drive(recordings.front().recording) == Quantity::strain;
-    std::erase_if(laws, [strain](const LawSpec& law) {
-      return law.kernel == Kernel::hertz || (strain && law.tension != Tension::none);
-    });
-  }
+  std::vector<LawSpec> laws = family_to_try(recordings, options);
   const std::vector<DataSet> data = data_sets(recordings);
   Selection s;
   s.margin = options.margin;
@@ -370,72 +449,28 @@ Selection select_law(std::span<const PreparedRecording> recordings,
     progress.advance();
   }
   add_laws_without_plateau(s, recordings, data, options);
-  // The residuals of the closest law are the nearest to noise alone.
-  const Candidate* closest = nullptr;
-  for (const Candidate& c : s.candidates) {
-    if (c.failed) continue;
-    if (closest == nullptr || c.fit.best.deviance < closest->fit.best.deviance) closest = &c;
-  }
-  if (closest == nullptr) {
-    throw Error(ExitCode::numerical, "selection",
-                fmt::format("none of {} laws could be fitted: {}", laws.size(),
-                            s.candidates.front().reason));
-  }
-  s.samples = closest->fit.value_count;
-  s.correlation = correlation_of(closest->fit);
-  s.effective_count = s.correlation.effective_count;
+  count_samples(s, laws.size());
   rank_candidates(s);
-  if (options.held_out) {
-    Progress predicting("predicting what was held out", s.candidates.size());
-    for (Candidate& c : s.candidates) {
-      hold_out(c, recordings, options);
-      predicting.advance();
-    }
-    if (s.candidates.front().held_out.empty()) {
-      s.remarks.push_back(
-          {"nothing_held_out",
-           fmt::format(
-               "nothing was held out: the second half of the hold has fewer than {} samples",
-               kFewestPredicted)});
-    }
-  }
+  if (options.held_out) predict_held_out(s, recordings, options);
   const auto with_profiles = [&](const LawSpec& law) {
     return run_fit(recording_config(law, recordings, options.setup), data);
   };
   settle_choice(s, protocol_spans(recordings),
                 options.setup.profiles ? ProfiledFit(with_profiles) : nullptr);
-  Candidate& chosen = s.candidates[s.recommended];
-  if (options.drift_answers) s.drift = give_both_drift_answers(chosen.fit, recordings);
-  if (s.drift)
-    chosen.fit.remarks.push_back({"drift_not_separable", drift_words(*s.drift, chosen.fit)});
-  if (options.drift_answers && s.preferred) {
-    FitResult& preferred = s.candidates[*s.preferred].fit;
-    const auto both = give_both_drift_answers(preferred, recordings);
-    if (both) preferred.remarks.push_back({"drift_not_separable", drift_words(*both, preferred)});
-  }
+  if (options.drift_answers) add_drift_answers(s, recordings);
   for (const auto i : {std::optional(s.recommended), s.preferred}) {
     if (i) doubt_plateau(s.candidates[*i].fit, protocol_spans(recordings));
   }
-  const auto warn = [&s](std::vector<Remark> more) {
-    std::ranges::move(more, std::back_inserter(s.remarks));
-  };
-  warn(recording_remarks(recordings));
-  warn(protocol_remarks(chosen.fit, recordings));
-  warn(outside_remarks(chosen.fit));
+  add_remarks(s, recordings);
   state_adequacy(s, recordings);
+  Candidate& chosen = s.candidates[s.recommended];
   if (doubt_untold_noise(chosen.fit)) {
     chosen.identified = false;
     chosen.reason = "the noise is not told";
   }
   name_channel_cause(s, recordings, options.setup);
   describe(s);
-  for (const PreparedRecording& r : recordings) {
-    if (!r.start_up.empty()) s.summary.push_back(r.start_up);
-    if (std::string rises = unseen_rise_words(r); !rises.empty()) s.summary.push_back(rises);
-    if (options.setup.contact) continue;
-    std::string jump = contact_in_jump_words(r, s.candidates[s.recommended].fit.config);
-    if (!jump.empty()) s.summary.push_back(std::move(jump));
-  }
+  describe_recordings(s, recordings, options);
   keep_choice(s);
   return s;
 }

@@ -218,53 +218,28 @@ class Comparer {
     result_.quantities.push_back(std::move(q));
   }
 
-  void set_uncertainty(QuantityComparison& q, const Functional& s, Functional d) {
+  /// Where nothing tells the zero that a quantity depends on: what the instrument states of it.
+  /// @return that uncertainty, 0 if there is none
+  double add_untold_zero(QuantityComparison& q, double by_zero, const Functional& d) {
     const ValidationPlacement& p = result_.placement;
-    // A time read from scattered readings may lie where they happen to be steep.
-    if (q.quantity.kind == QuantityKind::half_time &&
-        result_.scatter.of(r_.time_s, s.weight) > result_.scatter.of(r_.time_s, d.weight)) {
-      d.weight = s.weight;
+    const bool told = p.zero_readings > 0 || p.zero_known;
+    if (told || std::abs(by_zero) <= 1e-9 * d.weight.cwiseAbs().sum()) return 0.0;
+    if (!result_.creep && options_.instrument && options_.instrument->zero) {
+      const double stated = std::abs(by_zero) * *options_.instrument->zero;
+      q.parts.push_back({zero_name(), stated});
+      return stated;
     }
-    const double by_contact = weighted_sum(s.weight, at_.by_contact);
-    const double by_zero = d.weight.sum();
-    const Eigen::VectorXd from_contact = by_contact * p.contact_by_reading;
-    const Eigen::VectorXd from_zero = by_zero * p.zero_by_reading;
-    const Eigen::VectorXd weight = from_contact + from_zero - d.weight;
-    weights_.push_back(weight);
-    const auto u_of = [&](const Eigen::VectorXd& w) { return result_.scatter.of(r_.time_s, w); };
-    const double u_readings = u_of(weight);
-    q.parts.push_back({"the scatter of the readings", u_of(d.weight)});
-    q.parts.push_back({zero_name(), u_of(from_zero)});
-    q.of_contact = by_contact * p.contact_u_sampled;
-    q.parts.push_back({"the contact point", std::hypot(u_of(from_contact), q.of_contact)});
-    const double by_drift = p.drift ? p.drift->u(weight, r_.time_s) : 0.0;
-    q.parts.push_back({"the drift of the zero", by_drift});
-    const Eigen::RowVectorXd by_law = weighted_sum(s.weight, at_.by_law) +
-                                      by_contact * p.contact_by_law + by_zero * p.zero_by_law;
-    q.shared = by_law * along_.root();
-    q.u_input = q.shared.norm();
-    q.parts.push_back({"the law's parameters", q.u_input});
-    double stated_zero = 0.0;
-    const bool zero_told = p.zero_readings > 0 || p.zero_known;
-    if (!zero_told && std::abs(by_zero) > 1e-9 * d.weight.cwiseAbs().sum()) {
-      if (!result_.creep && options_.instrument && options_.instrument->zero) {
-        stated_zero = std::abs(by_zero) * *options_.instrument->zero;
-        q.parts.push_back({zero_name(), stated_zero});
-      } else {
-        q.remark = {"zero_not_known",
-                    fmt::format("depends on {}, which nothing before {} and no instrument tells",
-                                zero_name(), result_.creep ? "the load" : "contact")};
-        q.unknown = true;
-      }
-    }
-    add_instrument(q, s, d);
-    add_probe(q, s);
-    if (options_.specimens != nullptr) add_specimen(q, s);
+    q.remark = {"zero_not_known",
+                fmt::format("depends on {}, which nothing before {} and no instrument tells",
+                            zero_name(), result_.creep ? "the load" : "contact")};
+    q.unknown = true;
+    return 0.0;
+  }
+
+  /// Combines the parts to u_D, u_input and the uncertainty of the error.
+  /// @param stated what is stated of zero and contact, drift and rises
+  void combine(QuantityComparison& q, double u_readings, double stated) {
     const double own_instrument = q.of_instrument.norm();
-    for (const Eigen::VectorXd& slope : by_rise_) extend(q.of_rises, weighted_sum(s.weight, slope));
-    const double by_rises = q.of_rises.norm();
-    q.parts.push_back({"the time of a change between two samples", by_rises});
-    const double stated = std::hypot(std::hypot(stated_zero, q.of_contact), by_drift, by_rises);
     q.u_D = std::hypot(u_readings, own_instrument, stated);
     const double by_filling = q.of_filling.norm();
     const double of_numbers = std::sqrt(std::max(q.u_num * q.u_num - by_filling * by_filling, 0.0));
@@ -295,6 +270,43 @@ class Comparer {
     q.e.u_val = sum.u();
     q.e.degrees = sum.degrees();
     q.e.coverage = coverage_factor(q.e.degrees);
+  }
+
+  void set_uncertainty(QuantityComparison& q, const Functional& s, Functional d) {
+    const ValidationPlacement& p = result_.placement;
+    // A time read from scattered readings may lie where they happen to be steep.
+    if (q.quantity.kind == QuantityKind::half_time &&
+        result_.scatter.of(r_.time_s, s.weight) > result_.scatter.of(r_.time_s, d.weight)) {
+      d.weight = s.weight;
+    }
+    const double by_contact = weighted_sum(s.weight, at_.by_contact);
+    const double by_zero = d.weight.sum();
+    const Eigen::VectorXd from_contact = by_contact * p.contact_by_reading;
+    const Eigen::VectorXd from_zero = by_zero * p.zero_by_reading;
+    const Eigen::VectorXd weight = from_contact + from_zero - d.weight;
+    weights_.push_back(weight);
+    const auto u_of = [&](const Eigen::VectorXd& w) { return result_.scatter.of(r_.time_s, w); };
+    const double u_readings = u_of(weight);
+    q.parts.push_back({"the scatter of the readings", u_of(d.weight)});
+    q.parts.push_back({zero_name(), u_of(from_zero)});
+    q.of_contact = by_contact * p.contact_u_sampled;
+    q.parts.push_back({"the contact point", std::hypot(u_of(from_contact), q.of_contact)});
+    const double by_drift = p.drift ? p.drift->u(weight, r_.time_s) : 0.0;
+    q.parts.push_back({"the drift of the zero", by_drift});
+    const Eigen::RowVectorXd by_law = weighted_sum(s.weight, at_.by_law) +
+                                      by_contact * p.contact_by_law + by_zero * p.zero_by_law;
+    q.shared = by_law * along_.root();
+    q.u_input = q.shared.norm();
+    q.parts.push_back({"the law's parameters", q.u_input});
+    const double stated_zero = add_untold_zero(q, by_zero, d);
+    add_instrument(q, s, d);
+    add_probe(q, s);
+    if (options_.specimens != nullptr) add_specimen(q, s);
+    for (const Eigen::VectorXd& slope : by_rise_) extend(q.of_rises, weighted_sum(s.weight, slope));
+    const double by_rises = q.of_rises.norm();
+    q.parts.push_back({"the time of a change between two samples", by_rises});
+    const double stated = std::hypot(std::hypot(stated_zero, q.of_contact), by_drift, by_rises);
+    combine(q, u_readings, stated);
     std::erase_if(q.parts, [](const UncertaintyPart& part) { return !(part.u > 0.0); });
     std::stable_sort(q.parts.begin(), q.parts.end(),
                      [](const auto& a, const auto& b) { return a.u > b.u; });

@@ -312,7 +312,9 @@ std::vector<RenderingError> rendering_errors(const Validation& presses) {
   return all;
 }
 
-Validation validate(const ValidationRequest& request) {
+namespace {
+
+void require_valid(const ValidationRequest& request) {
   if (!request.law.uncertainty) {
     throw bad_input(request.law_file, "carries no uncertainty of a fit",
                     "a law.json that tpm fit has written; data that determine all parameters");
@@ -323,25 +325,32 @@ Validation validate(const ValidationRequest& request) {
                 "the name of one of the recordings");
   }
   if (request.presses.empty()) require_each_once(request.recordings);
-  Validation v;
-  const std::optional<LawFile> again =
-      with_calibration_covariance(request.law, found_recordings(request.calibration));
-  const LawFile& law = again ? *again : request.law;
-  v.u_input_from = again ? "the scatter of the calibration's recordings (sandwich)"
-                         : "the covariance in the law file";
+}
+
+/// Where the uncertainty of the law's parameters comes from.
+/// @param again the covariance was computed again, from the calibration's recordings
+std::string input_words(const ValidationRequest& request, const LawFile& law, bool again) {
+  std::string words = again ? "the scatter of the calibration's recordings (sandwich)"
+                            : "the covariance in the law file";
   if (request.contact_by_threshold && threshold_words(request).empty()) {
-    v.u_input_from += again ? ", with one step of the drive at the contact of each"
-                            : ", without the step of the drive at the calibration's contact";
+    words += again ? ", with one step of the drive at the contact of each"
+                   : ", without the step of the drive at the calibration's contact";
   }
   if (request.organ && !request.organ->times_follow() && law.spec.branches > 0) {
-    v.u_input_from += "; S follows the relaxation times, which the bonds keep, as the law does";
+    words += "; S follows the relaxation times, which the bonds keep, as the law does";
   }
-  v.new_specimen = request.new_specimen;
   if (request.new_specimen) {
-    v.specimens = spread_of_calibration(request, law);
-    v.u_input_from += fmt::format("; and the spread between its {} recordings, each a specimen",
-                                  request.calibration.files.size());
+    words += fmt::format("; and the spread between its {} recordings, each a specimen",
+                         request.calibration.files.size());
   }
+  return words;
+}
+
+/// What is compared with what, and what the request says of it.
+Validation validation_of(const ValidationRequest& request, const LawFile& law) {
+  Validation v;
+  v.new_specimen = request.new_specimen;
+  if (request.new_specimen) v.specimens = spread_of_calibration(request, law);
   v.spec = law.spec;
   v.subject = law_words(law.spec);
   if (request.organ)
@@ -352,9 +361,7 @@ Validation validate(const ValidationRequest& request) {
   v.law_sha256 = request.law_sha256;
   v.placement = request.placement;
   if (request.requirement) v.requirement = request.requirement->stated;
-  for (const CalibrationData::File& file : request.calibration.files) {
-    v.calibration.push_back(file);
-  }
+  v.calibration = request.calibration.files;
   v.remarks = request.remarks;
   v.remarks.insert(v.remarks.end(), request.calibration.remarks.begin(),
                    request.calibration.remarks.end());
@@ -366,57 +373,55 @@ Validation validate(const ValidationRequest& request) {
   add_unseen_spread(v);
   if (const std::string words = threshold_words(request); !words.empty())
     v.remarks.push_back({"contact_by_threshold", words});
-  const std::optional<OtherFillings> fillings =
-      request.organ ? std::optional(other_fillings(*request.organ)) : std::nullopt;
-  std::vector<RecordingComparison> unseen;
-  std::vector<Applicability> unseen_motions;
-  for (std::size_t i = 0; i < request.recordings.size(); ++i) {
-    const PreparedRecording& recording = request.recordings[i];
-    if (request.presses.empty()) require_rise(recording);
-    ComparisonOptions options;
-    options.quantities = request.quantities;
-    options.requirement = request.requirement;
-    options.placement = request.placement;
-    options.organ = request.organ.get();
-    options.fillings = fillings ? &*fillings : nullptr;
-    options.pick = request.pick;
-    options.rendering = request.rendering;
-    if (!request.presses.empty()) {
-      options.motion = request.presses.at(i);
-      options.known = KnownPlacement::surface;
-    } else if (request.contact_by_threshold) {
-      options.known = KnownPlacement::threshold;
-    }
-    if (i < request.instruments.size()) options.instrument = request.instruments[i];
-    options.calibration_instrument = request.calibration.instrument;
-    if (request.new_specimen) options.specimens = &v.specimens;
-    options.calibration_data = was_fitted(request, recording);
-    RecordingComparison comparison = compare_with_recording(law, recording, options);
-    if (!options.calibration_data) {
-      const std::string copied = copy_words(request, recording, comparison);
-      if (!copied.empty()) {
-        v.remarks.push_back({"copied_readings", copied});
-        options.calibration_data = true;
-        comparison = compare_with_recording(law, recording, options);
-      }
-    }
-    if (const std::string words = unit_words(comparison); !words.empty())
-      v.remarks.push_back({"unit_doubtful", words});
-    if (const std::string words =
-            probe_difference_words(options.instrument, options.calibration_instrument);
-        !words.empty()) {
-      v.remarks.push_back({"probes_differ", fmt::format("{}: {}", recording.name, words)});
-    }
-    Applicability motion = motion_of(recording, comparison.parts,
-                                     comparison.creep ? 0.0 : comparison.placement.contact);
-    compare_with_calibration(motion, request);
-    if (!comparison.calibration) {
-      unseen.push_back(comparison);
-      unseen_motions.push_back(motion);
-    }
-    v.recordings.push_back(std::move(comparison));
-    v.applicability.push_back(std::move(motion));
+  return v;
+}
+
+ComparisonOptions comparison_options(const ValidationRequest& request, const Validation& v,
+                                     std::size_t i, const OtherFillings* fillings) {
+  ComparisonOptions options;
+  options.quantities = request.quantities;
+  options.requirement = request.requirement;
+  options.placement = request.placement;
+  options.organ = request.organ.get();
+  options.fillings = fillings;
+  options.pick = request.pick;
+  options.rendering = request.rendering;
+  if (!request.presses.empty()) {
+    options.motion = request.presses.at(i);
+    options.known = KnownPlacement::surface;
+  } else if (request.contact_by_threshold) {
+    options.known = KnownPlacement::threshold;
   }
+  if (i < request.instruments.size()) options.instrument = request.instruments[i];
+  options.calibration_instrument = request.calibration.instrument;
+  if (request.new_specimen) options.specimens = &v.specimens;
+  options.calibration_data = was_fitted(request, request.recordings[i]);
+  return options;
+}
+
+/// Compares a recording; one that repeats readings of the calibration is none of its own.
+RecordingComparison compared(Validation& v, const ValidationRequest& request, const LawFile& law,
+                             const PreparedRecording& recording, ComparisonOptions options) {
+  RecordingComparison comparison = compare_with_recording(law, recording, options);
+  if (!options.calibration_data) {
+    const std::string copied = copy_words(request, recording, comparison);
+    if (!copied.empty()) {
+      v.remarks.push_back({"copied_readings", copied});
+      options.calibration_data = true;
+      comparison = compare_with_recording(law, recording, options);
+    }
+  }
+  if (const std::string words = unit_words(comparison); !words.empty())
+    v.remarks.push_back({"unit_doubtful", words});
+  if (const std::string words =
+          probe_difference_words(options.instrument, options.calibration_instrument);
+      !words.empty()) {
+    v.remarks.push_back({"probes_differ", fmt::format("{}: {}", recording.name, words)});
+  }
+  return comparison;
+}
+
+void remark_bounds(Validation& v, const LawFile& law) {
   const std::vector<LawParameter> parameters = law_parameters(law.spec);
   for (const std::string& name : law.uncertainty->at_bound) {
     // Contact and offset of a calibration's recording are none of the law's.
@@ -428,14 +433,19 @@ Validation validate(const ValidationRequest& request) {
         {"parameter_at_bound",
          fmt::format("{} stood on a bound of the fit: its uncertainty is not in u_input", name)});
   }
-  require_fitting_unit(v, request.requirement);
+}
+
+/// Pools the recordings that the law was not fitted to, and decides.
+void decide(Validation& v, const ValidationRequest& request, const LawFile& law,
+            const std::vector<RecordingComparison>& unseen,
+            const std::vector<Applicability>& motions) {
   if (unseen.empty()) {
     v.verdict = ModelVerdict::residual;
-    return v;
+    return;
   }
   const PooledOptions pooling{request.requirement, request.at};
   v.pooled = pool_recordings(
-      unseen, unseen_motions,
+      unseen, motions,
       law.uncertainty->degrees_of_freedom.value_or(std::numeric_limits<double>::infinity()),
       pooling);
   const auto limited_at = [](const PooledQuantity& p) { return p.limit_at.value_or(""); };
@@ -448,6 +458,40 @@ Validation validate(const ValidationRequest& request) {
              v.requirement, name)});
   }
   v.verdict = unseen.size() > 1 ? judge_together(v, unseen) : unseen.front().verdict;
+}
+
+}  // namespace
+
+Validation validate(const ValidationRequest& request) {
+  require_valid(request);
+  const std::optional<LawFile> again =
+      with_calibration_covariance(request.law, found_recordings(request.calibration));
+  const LawFile& law = again ? *again : request.law;
+  Validation v = validation_of(request, law);
+  v.u_input_from = input_words(request, law, again.has_value());
+  const std::optional<OtherFillings> fillings =
+      request.organ ? std::optional(other_fillings(*request.organ)) : std::nullopt;
+  std::vector<RecordingComparison> unseen;
+  std::vector<Applicability> unseen_motions;
+  for (std::size_t i = 0; i < request.recordings.size(); ++i) {
+    const PreparedRecording& recording = request.recordings[i];
+    if (request.presses.empty()) require_rise(recording);
+    RecordingComparison comparison =
+        compared(v, request, law, recording,
+                 comparison_options(request, v, i, fillings ? &*fillings : nullptr));
+    Applicability motion = motion_of(recording, comparison.parts,
+                                     comparison.creep ? 0.0 : comparison.placement.contact);
+    compare_with_calibration(motion, request);
+    if (!comparison.calibration) {
+      unseen.push_back(comparison);
+      unseen_motions.push_back(motion);
+    }
+    v.recordings.push_back(std::move(comparison));
+    v.applicability.push_back(std::move(motion));
+  }
+  remark_bounds(v, law);
+  require_fitting_unit(v, request.requirement);
+  decide(v, request, law, unseen, unseen_motions);
   return v;
 }
 
