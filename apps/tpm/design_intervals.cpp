@@ -5,7 +5,7 @@
 #include "answer.hpp"
 #include "design_options.hpp"
 #include "tpm/base/text.hpp"
-#include "tpm/fit/coverage.hpp"
+#include "tpm/fit/design/coverage.hpp"
 #include "tpm/show/json_table_csv.hpp"
 
 namespace tpm::app {

@@ -2,7 +2,7 @@
 // exact binomial test at the 0.1 % level, no bound near.
 #include <catch2/catch.hpp>
 
-#include "tpm/fit/coverage.hpp"
+#include "tpm/fit/design/coverage.hpp"
 
 using namespace tpm;
 using namespace tpm::fit;

@@ -11,6 +11,7 @@
 #include "tpm/fit/autoregressive.hpp"
 #include "tpm/fit/confirmation.hpp"
 #include "tpm/fit/noise_of_estimates.hpp"
+#include "tpm/fit/recording/placement.hpp"
 #include "tpm/fit/select/fixed_times.hpp"
 #include "tpm/fit/select/gate.hpp"
 #include "tpm/fit/select/material_function.hpp"
@@ -204,6 +205,25 @@ TEST_CASE("the limits of a profile follow each parameter's own noise", "[interva
   }
   const NoiseOfEstimates& noise = *fit.noise;
   CHECK(noise.of[0].variance_ratio != noise.of[1].variance_ratio);
+}
+
+TEST_CASE("a noise of half a step of the readings is no smaller one but by chance", "[intervals]") {
+  test::PlacedTest made;
+  made.start_m = -0.5e-3;
+  const double step = 2.0 * made.noise_N;
+  const Recording clean = test::placed(made);
+  Random random(5);
+  constexpr int kRests = 200;
+  int widened = 0;
+  for (int i = 0; i < kRests; ++i) {
+    Recording readings = test::measured(made, clean, random);
+    for (double& v : readings.response) v = step * std::round(v / step);
+    const RestReadings rests = read_rests(prepare_recording("made.csv", std::move(readings)));
+    REQUIRE(rests.zero);
+    REQUIRE(rests.before >= 95);
+    if (rests.zero->sd > 0.25 * step) ++widened;
+  }
+  CHECK(widened <= 20);  // 5 % are expected
 }
 
 TEST_CASE("readings that hide their noise widen an interval by half a step", "[intervals]") {

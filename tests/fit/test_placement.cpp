@@ -76,25 +76,6 @@ TEST_CASE("the zero of a rest has the standard deviation of its correlated mean"
   }
 }
 
-TEST_CASE("a noise of half a step of the readings is no smaller one but by chance", "[placement]") {
-  PlacedTest test;
-  test.start_m = -0.5e-3;
-  const double step = 2.0 * test.noise_N;
-  const Recording clean = test::placed(test);
-  Random random(5);
-  constexpr int kRests = 200;
-  int widened = 0;
-  for (int i = 0; i < kRests; ++i) {
-    Recording readings = test::measured(test, clean, random);
-    for (double& v : readings.response) v = step * std::round(v / step);
-    const RestReadings rests = read_rests(prepare_recording("made.csv", std::move(readings)));
-    REQUIRE(rests.zero);
-    REQUIRE(rests.before >= 95);
-    if (rests.zero->sd > 0.25 * step) ++widened;
-  }
-  CHECK(widened <= 20);  // 5 % are expected
-}
-
 TEST_CASE("the onset is off by less than 0.2 % of the force", "[placement]") {
   struct Material {
     const char* law;

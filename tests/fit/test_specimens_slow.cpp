@@ -5,7 +5,7 @@
 #include <map>
 
 #include "tpm/base/random.hpp"
-#include "tpm/fit/coverage.hpp"
+#include "tpm/fit/design/coverage.hpp"
 #include "tpm/fit/groups/specimens.hpp"
 #include "tpmkit/law_model.hpp"
 

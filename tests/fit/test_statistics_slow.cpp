@@ -5,7 +5,7 @@
 #include <catch2/catch.hpp>
 
 #include "statistics_problems.hpp"
-#include "tpm/fit/coverage.hpp"
+#include "tpm/fit/design/coverage.hpp"
 #include "tpm/fit/likelihood/correlation.hpp"
 
 using namespace tpm;

@@ -8,7 +8,7 @@
 #include "fitted_parameter.hpp"
 #include "gradient_check.hpp"
 #include "tpm/base/random.hpp"
-#include "tpm/fit/coverage.hpp"
+#include "tpm/fit/design/coverage.hpp"
 #include "tpm/fit/fit.hpp"
 #include "tpm/fit/show/fit_report.hpp"
 #include "tpmkit/frequency_response.hpp"

@@ -7,7 +7,7 @@
 #include <vector>
 
 #include "tpm/base/random.hpp"
-#include "tpm/fit/coverage.hpp"
+#include "tpm/fit/design/coverage.hpp"
 #include "tpm/fit/design/recovery.hpp"
 #include "tpm/fit/fitted_law.hpp"
 #include "tpm/fit/online/identification.hpp"

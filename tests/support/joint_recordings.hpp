@@ -56,8 +56,8 @@ inline double slack_length_of(int k) {
   return 1.0 + 0.03 * k;
 }
 
-/// Ramp and hold at rates, contacts (or slack lengths) and offsets of their own, with noise of 0.2 %
-/// of the first peak.
+/// Ramp and hold at rates, contacts (or slack lengths) and offsets of their own, with noise of 0.2
+/// % of the first peak.
 inline std::vector<fit::PreparedRecording> joint_recordings(const LawSpec& spec, int count) {
   std::vector<fit::PreparedRecording> recordings;
   const bool stretch = spec.drive == Quantity::relative_length;

@@ -108,4 +108,8 @@ std::string with_arguments_for_options(std::string_view message) {
   return text;
 }
 
+std::string probability(double p) {
+  return p < 1e-4 ? significant(p, 2) : fixed(p, 4);
+}
+
 }  // namespace tpm::base

@@ -12,6 +12,9 @@ namespace tpm::base {
 /// and "nan".
 [[nodiscard]] std::string significant(double value, int digits);
 
+/// A probability for people: "0.0012", "2e-18".
+[[nodiscard]] std::string probability(double p);
+
 /// Significant digits of the numbers of results in JSON and CSV, where no other number is given.
 inline constexpr int kResultDigits = 6;
 

@@ -5,8 +5,8 @@
 #include <algorithm>
 #include <cmath>
 
-#include "tpm/fit/select/placement_parameters.hpp"
 #include "tpmkit/error.hpp"
+#include "tpmkit/law_model.hpp"
 
 namespace tpm::fit {
 namespace {
@@ -304,6 +304,15 @@ LawFile fitted_law(const FitResult& fit) {
   law.uncertainty = uncertainty_of(fit, law.spec);
   law.adequacy = fit.adequacy;
   return law;
+}
+
+bool has_own_slack(const FitConfig& config) {
+  if (!config.law || config.law->drive != Quantity::relative_length) return false;
+  const std::size_t contact = LawModel(*config.law).index("contact");
+  return std::ranges::any_of(config.parameters, [contact](const EstimatedParameter& p) {
+    return p.sets.size() == 1 && p.sets.front().parameter == contact &&
+           !p.sets.front().data.empty();
+  });
 }
 
 }  // namespace tpm::fit

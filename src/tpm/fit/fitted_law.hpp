@@ -26,4 +26,7 @@ namespace tpm::fit {
 /// The coordinate of a law file in which a parameter was estimated.
 [[nodiscard]] Coordinate coordinate_of(Scale scale);
 
+/// True if recordings of a stretch that are fitted together have slack lengths of their own.
+[[nodiscard]] bool has_own_slack(const FitConfig& config);
+
 }  // namespace tpm::fit

@@ -5,7 +5,7 @@
 #include <vector>
 
 #include "tpm/files/json.hpp"
-#include "tpm/fit/coverage.hpp"
+#include "tpm/fit/design/coverage.hpp"
 #include "tpm/fit/select/selection.hpp"
 
 namespace tpm::fit {

@@ -7,7 +7,6 @@
 #include "tpm/base/text.hpp"
 #include "tpm/files/blocks/law_json.hpp"
 #include "tpm/fit/groups/group_comparison.hpp"
-#include "tpm/fit/show/fit_cells.hpp"
 #include "tpm/show/json_table_csv.hpp"
 
 namespace tpm::fit {

@@ -388,13 +388,4 @@ void add_placement(FitConfig& config, const LawModel& model,
   }
 }
 
-bool has_own_slack(const FitConfig& config) {
-  if (!config.law || config.law->drive != Quantity::relative_length) return false;
-  const std::size_t contact = LawModel(*config.law).index("contact");
-  return std::ranges::any_of(config.parameters, [contact](const EstimatedParameter& p) {
-    return p.sets.size() == 1 && p.sets.front().parameter == contact &&
-           !p.sets.front().data.empty();
-  });
-}
-
 }  // namespace tpm::fit

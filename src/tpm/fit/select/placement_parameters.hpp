@@ -38,7 +38,4 @@ void add_possible_drift(FitConfig& config, const PreparedRecording& recording, s
 void add_placement(FitConfig& config, const LawModel& model,
                    std::span<const PreparedRecording> recordings, const SetupOptions& options);
 
-/// True if recordings of a stretch that are fitted together have slack lengths of their own.
-[[nodiscard]] bool has_own_slack(const FitConfig& config);
-
 }  // namespace tpm::fit

@@ -9,6 +9,7 @@
 
 #include "tpm/base/lists.hpp"
 #include "tpm/base/text.hpp"
+#include "tpm/fit/fitted_law.hpp"
 #include "tpm/fit/likelihood/load_imposed.hpp"
 #include "tpm/fit/recording/placement.hpp"
 #include "tpm/fit/recording/unseen_rises.hpp"

@@ -30,10 +30,6 @@ Tone tone_of_residual(double standardised) {
   return size > 3.0 ? Tone::bad : size > 2.0 ? Tone::fair : Tone::plain;
 }
 
-std::string probability(double p) {
-  return p < 1e-4 ? significant(p, 2) : fixed(p, 4);
-}
-
 std::string observed(const FitDatum& d) {
   const auto& [symbol, dimension, unit] = shown_unit(quantity_dimension(d.quantity));
   if (d.value) return fmt::format("{} {}", significant(*d.value / unit, 4), symbol);

@@ -11,9 +11,6 @@ namespace tpm::fit {
 /// A standardised residual beyond 2 is unusual, beyond 3 wrong.
 [[nodiscard]] Tone tone_of_residual(double standardised);
 
-/// "0.0012", "2e-18"
-[[nodiscard]] std::string probability(double p);
-
 /// "0.32 N", or "0.07 to 0.18 N" of a band.
 [[nodiscard]] std::string observed(const FitDatum& datum);
 

@@ -138,4 +138,14 @@ ModelVerdict verdict_of_all(const std::vector<QuantityComparison>& quantities) {
   return unknown ? ModelVerdict::undetermined : ModelVerdict::not_seen;
 }
 
+RecordingComparison begun_comparison(const PreparedRecording& recording,
+                                     const ComparisonOptions& options) {
+  RecordingComparison begun;
+  begun.name = recording.name;
+  begun.session = options.motion.session;
+  begun.press = options.motion.press;
+  if (options.motion.knots.empty()) begun.rises = unseen_rises(recording);
+  return begun;
+}
+
 }  // namespace tpm::fit

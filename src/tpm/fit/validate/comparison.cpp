@@ -26,15 +26,6 @@ constexpr double kAllDegrees = std::numeric_limits<double>::infinity();
 constexpr double kNumericalError = 1e-9;  // of the value: the closed forms err by less (LawModel)
 constexpr const char* kFilling = "the place of the spheres";
 
-RecordingComparison begun(const PreparedRecording& recording, const ComparisonOptions& options) {
-  RecordingComparison begun;
-  begun.name = recording.name;
-  begun.session = options.motion.session;
-  begun.press = options.motion.press;
-  if (options.motion.knots.empty()) begun.rises = unseen_rises(recording);
-  return begun;
-}
-
 /// Computes all quantities of a recording.
 class Comparer {
  public:
@@ -42,7 +33,7 @@ class Comparer {
       : options_(options),
         prepared_(recording),
         r_(prepared_.recording),
-        result_(begun(prepared_, options)),
+        result_(begun_comparison(prepared_, options)),
         along_(law, prepared_, options.organ, options.motion.knots,
                mapped<DelayedRise>(result_.rises, &UnseenRise::expected)),
         degrees_of_law_(law.uncertainty->degrees_of_freedom.value_or(kAllDegrees)) {}
@@ -477,8 +468,7 @@ class Comparer {
     curve.mean_square_error /= static_cast<double>(times.size());
     curve.mean_square_u /= static_cast<double>(times.size());
     if (!(sigma > 0.0)) return;
-    Eigen::VectorXd whitened =
-        Eigen::VectorXd::Map(errors.data(), static_cast<Eigen::Index>(errors.size()));
+    Eigen::VectorXd whitened = Eigen::VectorXd::Map(errors.data(), std::ssize(errors));
     AutoregressiveNoise(result_.scatter.phi, result_.scatter.step_s).whiten(times, whitened);
     curve.chi_squared = whitened.squaredNorm() / (sigma * sigma);
   }

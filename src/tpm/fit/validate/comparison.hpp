@@ -134,6 +134,10 @@ struct ComparisonOptions {
   const std::vector<SpecimenSpread>* specimens = nullptr;
 };
 
+/// A comparison of which nothing is computed: names, and rises that the samples do not show.
+[[nodiscard]] RecordingComparison begun_comparison(const PreparedRecording& recording,
+                                                   const ComparisonOptions& options);
+
 /// Compares a law with one recording (docs/validate.md):
 ///
 ///     E = Q(S) - Q(readings less zero),   u_val^2 = u_num^2 + u_input^2 + u_D^2,   U = k u_val,

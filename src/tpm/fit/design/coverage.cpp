@@ -1,4 +1,4 @@
-#include "tpm/fit/coverage.hpp"
+#include "tpm/fit/design/coverage.hpp"
 
 #include <fmt/format.h>
 
