@@ -79,6 +79,15 @@ void add_end(Json& result, const fs::path& folder, const std::vector<std::string
   result["next"] = next.empty() ? Json(nullptr) : Json(next);
 }
 
+std::string next_with_law(const std::string& law, const LawSpec& spec) {
+  const std::string file = shell_word(law);
+  if (!is_answered_by_stress(spec.drive)) {
+    return fmt::format("tpm hil run configs/hil_law.json --law {} -o session.tpmrec", file);
+  }
+  const bool sayable = spec.solid && spec.kernel != Kernel::power && spec.tension == Tension::none;
+  return fmt::format("tpm export {} --to {}", file, sayable ? "febio" : "json --relaxation-only");
+}
+
 std::string next_line(const std::string& next) {
   return next.empty() ? std::string() : fmt::format("next: {}\n", next);
 }

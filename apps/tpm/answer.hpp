@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "command.hpp"
+#include "tpmkit/law.hpp"
 
 namespace tpm::app {
 
@@ -27,6 +28,11 @@ struct Verdict {
 /// @param folder the files are in; may be empty
 void add_end(Json& result, const std::filesystem::path& folder,
              const std::vector<std::string>& files, const std::string& next);
+
+/// The command that puts a law to use: a session of an indentation law, else the law in another
+/// program.
+/// @param law path of the law's file
+[[nodiscard]] std::string next_with_law(const std::string& law, const LawSpec& spec);
 
 /// "next: COMMAND", the line that ends a text; none if there is no command.
 [[nodiscard]] std::string next_line(const std::string& next);

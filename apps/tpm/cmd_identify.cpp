@@ -44,13 +44,10 @@ IdentifyOptions identify_options(const IdentifyCommand& command, Quantity drive)
 
 /// The law in a session; of a strip the law in another program. Without a folder, the command that
 /// writes one.
-std::string next_of_identify(const IdentifyCommand& command, Quantity drive,
+std::string next_of_identify(const IdentifyCommand& command, const LawSpec& law,
                              const Session& session) {
   if (command.folder.empty()) return same_command(session, "--folder identified");
-  const std::string law = shell_word((std::filesystem::path(command.folder) / "law.json").string());
-  return drive == Quantity::indentation_depth
-             ? fmt::format("tpm hil run configs/hil_law.json --law {} -o session.tpmrec", law)
-             : fmt::format("tpm export {} --to febio", law);
+  return next_with_law((std::filesystem::path(command.folder) / "law.json").string(), law);
 }
 
 int run_identify(const IdentifyCommand& command, const Session& session) {
@@ -74,10 +71,12 @@ int run_identify(const IdentifyCommand& command, const Session& session) {
   }
   if (session.json()) {
     Json ended = json;
-    add_end(ended, command.folder, files, next_of_identify(command, drive, session));
+    add_end(ended, command.folder, files,
+            next_of_identify(command, id.laws[id.result().law], session));
     text = answer_text(session, std::move(ended));
   } else if (!command.verbose) {
-    end_answer(answer, command.folder, files, next_of_identify(command, drive, session));
+    end_answer(answer, command.folder, files,
+               next_of_identify(command, id.laws[id.result().law], session));
     text = to_text(answer);
   } else if (!files.empty()) {
     text += written(session, command.folder, files);

@@ -96,9 +96,7 @@ std::string next_of_prediction(const PredictOptions& options, const LawPredictio
     return fmt::format("tpm validate {} {}", subject, shell_word(options.recordings.files.front()));
   }
   if (is_organ_document(read_json_of(options.law, "law"))) return "tpm plan " + subject;
-  return is_answered_by_stress(prediction.spec.drive)
-             ? fmt::format("tpm export {} --to febio", subject)
-             : fmt::format("tpm hil run configs/hil_law.json --law {} -o session.tpmrec", subject);
+  return next_with_law(options.law, prediction.spec);
 }
 
 int predict(const PredictOptions& options, const Session& session) {

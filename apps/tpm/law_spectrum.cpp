@@ -89,7 +89,7 @@ int write_spectrum(const SpectrumTexts& texts, const Session& session) {
   const ResultTable<SpectrumRow> table = spectrum_table(law.spec.response == Quantity::stress);
   Json json{{"law", to_json(law)}};
   json.update(table.lists(rows));
-  const std::string next = fmt::format("tpm export {} --to febio", shell_word(texts.law));
+  const std::string next = next_with_law(texts.law, law.spec);
   add_end(json, {}, {}, next);
   deliver(session.json() ? answer_text(session, std::move(json))
                          : fmt::format("{}: {}\n\n{}{}", law_name(law.spec), law_words(law.spec),

@@ -145,6 +145,31 @@ TEST_CASE("a reading of 0 at the step itself is from before it") {
   }
 }
 
+TEST_CASE("a strain that rises in the first rows counts from half of its step") {
+  // A strain of 2 % that is reached after `rise_s` of 100 s; 1 kPa, of which a part relaxes.
+  const auto table = [](double rise_s, double first_share, double relaxing) {
+    std::string text = "Step time [s],Strain [%],Stress [Pa]\n";
+    const auto row = [&](double time, double share) {
+      const double modulus = 1000.0 * (1.0 - relaxing * (1.0 - std::exp(-time)));
+      text += fmt::format("{},{},{}\n", time, 2.0 * share, 0.02 * share * modulus);
+    };
+    for (const double part : {first_share, 0.6, 0.9}) row(part * rise_s, part);
+    for (double time = rise_s; time <= 100.0; time *= 1.1) row(time, 1.0);
+    return text;
+  };
+  const TableReader read;
+  const RecordingFile file = read(table(4e-3, 0.3, 0.5));
+  CHECK(file.recording.response_quantity == Quantity::relaxation_modulus);
+  CHECK_THAT(file.recording.time_s.front(), WithinRel(2e-3, 1e-9));
+  CHECK_THAT(file.recording.response.front(), WithinRel(1000.0, 0.01));
+  CHECK_THAT(told(file.findings, "left out"),
+             Contains("the first 3 rows, in which the strain") && Contains("half of the step"));
+  // A ramp that lasts, one whose begin is seen, and a strain that answers are none.
+  CHECK(read(table(0.4, 0.3, 0.5)).recording.response_quantity == Quantity::stress);
+  CHECK(read(table(4e-3, 0.0, 0.5)).recording.response_quantity == Quantity::stress);
+  CHECK(read(table(4e-3, 0.3, 0.0)).recording.response_quantity == Quantity::stress);
+}
+
 TEST_CASE("storage and loss compliance become moduli") {
   std::string text = "omega [rad/s],J' [1/kPa],J'' [1/kPa]\n";
   std::string words = "omega [rad/s],Storage compliance [1/kPa],Loss compliance [1/kPa]\n";

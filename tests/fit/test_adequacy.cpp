@@ -339,4 +339,11 @@ TEST_CASE("a drive that was rounded is told from one that lies on a grid", "[rou
   std::vector<double> stairs;
   for (int i = 0; i < 400; ++i) stairs.push_back(std::floor(0.01 * i));
   CHECK(rounded_levels(stairs).levels.empty());
+  // Cycles pass the same few levels again and again.
+  std::vector<double> cycles;
+  for (int i = 0; i < 1500; ++i) cycles.push_back(i / 50 % 2);
+  CHECK(rounded_levels(cycles).levels.empty());
+  for (int i = 0; i < 1500; ++i)
+    cycles[static_cast<std::size_t>(i)] = std::min({i % 60, 4, 60 - i % 60});
+  CHECK(rounded_levels(cycles).levels.empty());
 }

@@ -354,8 +354,9 @@ TEST_CASE("a simulation that fails never looks like a perfect fit") {
   CHECK(m.deviance >= 4.0);
   function.always = true;
   CHECK_FALSE(minimise(function, parameters, std::vector<double>{1.0}).usable);
-  CHECK_THROWS_WITH(fit_residuals(function, {p}, {{1.0}, {2.0}, {3.0}}, Threshold{}, false),
-                    "fit: none of 3 starts ended in a point that can be evaluated");
+  CHECK_THROWS_WITH(
+      fit_residuals(function, {p}, {{1.0}, {2.0}, {3.0}}, Threshold{}, false),
+      Catch::StartsWith("fit: none of 3 starts ended in a point that can be evaluated; expected "));
 }
 
 TEST_CASE("robust losses hold an outlier down") {

@@ -129,7 +129,7 @@ TEST_CASE("the plateau lies in its interval though the depth was recorded in coa
     for (double& depth : r.drive) depth = std::round(depth / kStep_m) * kStep_m;
     const PreparedRecording recording = prepare_recording("made.csv", std::move(r));
     const Selection s = selected_of(recording, "linear-1", true);
-    const ParameterResult& p = parameter_of(s.candidates[s.recommended].fit, "k_inf");
+    const ParameterResult& p = find(s.candidates[s.recommended].fit, "k_inf");
     CAPTURE(shift_m);
     REQUIRE((p.lower && p.upper));
     holds += *p.lower < 60.0 && *p.upper > 60.0;

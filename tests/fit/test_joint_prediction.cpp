@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "joint_recordings.hpp"
+#include "tpm/fit/validate/comparison.hpp"
 
 using namespace tpm;
 using namespace tpm::fit;
@@ -51,6 +52,10 @@ TEST_CASE("strips with slack lengths of their own that are fitted together keep 
       const FittedFile& file = files[static_cast<std::size_t>(k)];
       REQUIRE(file.contact);
       CHECK(std::abs(*file.contact - test::slack_length_of(k)) < 0.004);
+      // Not at the mean of the slack lengths, which none of them has.
+      const RecordingComparison compared =
+          compare_with_recording(law, strips[static_cast<std::size_t>(k)], {});
+      CHECK(std::abs(compared.placement.contact - test::slack_length_of(k)) < 0.01);
     }
     const RecordingFit& last = fit.recordings.back();
     CHECK(last.rms_residual < 0.004 * last.peak);  // noise of 0.2 % of the first peak

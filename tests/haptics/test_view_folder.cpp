@@ -136,6 +136,21 @@ TEST_CASE("a folder of folders is viewed by what they hold") {
         Json({"r.csv", "peak force", "not adequate", "200 uN", "1.25 N", "0.5 N", "0.25 N", "-"}));
 }
 
+TEST_CASE("links to folders are told and not followed, notes that begin like JSON left out") {
+  const TempFolder folder;
+  std::filesystem::create_directory(folder / "fit");
+  std::ofstream(folder / "fit/law.json") << kLawAlone;
+  std::ofstream(folder / "other.json") << kLawAlone;
+  std::ofstream(folder / "notes.txt") << "{ broken";
+  std::filesystem::create_symlink("loop", folder / "loop");
+  std::filesystem::create_directory_symlink(".", folder / "self");
+  const Viewed viewed = view_path(folder.path());
+  CHECK(viewed.files.size() == 2);
+  REQUIRE(viewed.not_shown.size() == 1);
+  CHECK_THAT(std::string(viewed.not_shown.front().reason.what()),
+             Contains("self: is a link to a folder, which is not followed"));
+}
+
 TEST_CASE("a table is no result: tpm view names the command that fits it") {
   const TempFolder folder;
   std::ofstream(folder / "r.csv") << "time [s],force [N]\n0,0\n";

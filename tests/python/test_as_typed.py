@@ -66,6 +66,9 @@ class Tables(unittest.TestCase):
         by_milli = tpmkit.fit(milli, **QUICK).parameters.estimate
         for name, value in self.fit.parameters.estimate.items():
             self.assertAlmostEqual(by_milli[name] / value, 1.0, places=3)
+        odd = plain.assign({"force (raw)": plain.force.copy().assign_attrs(units="V"), "depth (2)": plain.depth.copy()})
+        self.assertTrue(tpmkit.fit(odd, columns={"drive": "depth", "response": "force"}, **QUICK)
+                        .parameters.equals(self.fit.parameters))
         for data, units, words in (
             (milli, {"force": "N"}, "force is in mN by its attribute and units says N; expected the same"),
             (milli.rename(force="force (N)"), None, r"force \(N\) is in mN by its attribute and its name says N"),

@@ -2,6 +2,7 @@
 // Bad input about the placement of recordings: priors, drifts, held contacts, imposed loads.
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <cmath>
 #include <stdexcept>
 #include <string>
@@ -48,9 +49,11 @@ inline std::string creep_recording() {
 /// A strain that goes on under a stress that is there from the first row on.
 inline std::string loaded_creep_recording() {
   std::string text = "time [s],strain [%],stress [Pa]\n";
-  for (int i = 0; i <= 200; ++i) {
-    const double t = 0.1 * i;
-    text += fmt::format("{:.1f},{:.4f},100.0\n", t, 3.0 * (1.0 - std::exp(-0.2 * t)));
+  for (int i = 0; i <= 300; ++i) {
+    const double t = 0.1 * i, crept = 3.0 * (1.0 - std::exp(-0.2 * std::min(t, 20.0)));
+    const bool loaded = i <= 200;
+    text += fmt::format("{:.1f},{:.4f},{}\n", t, crept * (loaded ? 1.0 : std::exp(4.0 - 0.2 * t)),
+                        loaded ? "100.0" : "0.0");
   }
   return text;
 }

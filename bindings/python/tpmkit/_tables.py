@@ -84,8 +84,14 @@ def _is_number(text: str) -> bool:
     return True
 
 
+# Units that are written between brackets behind the name of a quantity of a recording.
+_BRACKETED = {"s", "ms", "min", "h", "m", "cm", "mm", "um", "nm", "%", "N", "kN", "mN", "uN", "nN", "pN", "g", "kg", "Pa", "kPa",
+              "MPa", "GPa"}
+
+
 def _with_titles(where: str, data: xarray.Dataset, units: Mapping[str, str]) -> xarray.Dataset:
-    """The same with the attributes `units` in the names: force with the units "mN" becomes "force (mN)". Raises
+    """The same with the attributes `units` in the names: force with the units "mN" becomes "force (mN)". Words between
+    brackets that the attribute does not repeat stay where they are no unit of these quantities: "force (raw)". Raises
     tpmkit.ArgumentError where a name, or `units` of the call, says another unit."""
     from ._data import unit_of
 
@@ -95,7 +101,7 @@ def _with_titles(where: str, data: xarray.Dataset, units: Mapping[str, str]) -> 
         if not isinstance(unit, str) or not unit or not isinstance(name, str):
             continue
         inside = re.search(r"[(\[]([^()\[\]]*)[)\]]\s*$", name)
-        own = inside[1] if inside else unit_of(name)
+        own = (inside[1] if inside[1] in {unit, *_BRACKETED} else None) if inside else unit_of(name)
         for said, by in ((units.get(name), "units"), (own, "its name")):
             if said is not None and said != unit:
                 raise _core.ArgumentError(f"{where}: {name} is in {unit} by its attribute and {by} says {said}; expected the same")

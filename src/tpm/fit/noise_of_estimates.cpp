@@ -244,14 +244,14 @@ Eigen::MatrixXd covariance_of_drive_rounding(const ExperimentResiduals& function
                                              const std::vector<std::size_t>& free,
                                              std::span<const double> natural, double variance) {
   constexpr double kMatters = 0.25;  // standard errors
-  const std::vector<Eigen::VectorXd> draws = function.drive_rounding_slopes(natural);
-  if (draws.empty()) return {};
+  const std::vector<Eigen::VectorXd> slopes = function.drive_rounding_slopes(natural);
+  if (slopes.empty()) return {};
   const std::vector<Eigen::Index> columns(free.begin(), free.end());
   const Eigen::Index p = estimates.length().size();
   Eigen::MatrixXd covariance = Eigen::MatrixXd::Zero(p, p);
-  for (const Eigen::VectorXd& draw : draws) {
-    const Eigen::VectorXd moved = estimates.moved_by(draw(columns));
-    covariance += moved * moved.transpose() / static_cast<double>(draws.size());
+  for (const Eigen::VectorXd& slope : slopes) {
+    const Eigen::VectorXd moved = estimates.moved_by(slope(columns));
+    covariance += moved * moved.transpose();
   }
   const Eigen::ArrayXd square = kMatters * kMatters * variance * estimates.plain_variance();
   if (!covariance.allFinite() || !(covariance.diagonal().array() > square).any()) return {};

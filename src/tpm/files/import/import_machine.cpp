@@ -457,8 +457,7 @@ ImportedSeries read_machine(const DelimitedTable& table, const std::string& file
     divide_by_size(series, options);
     sort_shuffled_rows(series);
     keep_time_window(series, file, options);
-    resolve_kept_step(series);
-    require_step_clock(series, file, options);
+    if (resolve_kept_step(series, options) == 0) require_step_clock(series, file, options);
     leave_out_zero_at_step(series);
   }
   series.name = header.sheet;

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 #include <numeric>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -40,6 +41,54 @@ void keep_rows(std::vector<T>& values, std::size_t first, std::size_t end) {
   if (values.empty()) return;
   values.erase(values.begin() + static_cast<std::ptrdiff_t>(end), values.end());
   values.erase(values.begin(), values.begin() + static_cast<std::ptrdiff_t>(first));
+}
+
+/// Rows in which a step is not yet reached: it rises from the first sample on, and is kept within
+/// 2 % from there. Nothing if it is not kept.
+std::optional<std::size_t> rows_before_kept(const std::vector<double>& values,
+                                            const std::vector<double>& times) {
+  constexpr double kKept = 0.02;   // of its mean, from the smallest to the largest
+  constexpr double kSoon = 1e-3;   // of the time
+  constexpr double kBegun = 0.05;  // of the step: a recording that begins below shows its ramp
+  double low = values.back(), high = low;
+  std::size_t first = values.size();
+  for (; first > 0; --first) {
+    const double next = values[first - 1];
+    const double lower = std::min(low, next), upper = std::max(high, next);
+    if (!(lower * upper > 0.0) || upper - lower > kKept * std::abs(0.5 * (lower + upper))) break;
+    low = lower;
+    high = upper;
+  }
+  if (first == 0) return 0;
+  if (first == values.size()) return std::nullopt;
+  const double step = values[first];
+  for (std::size_t i = 0; i < first; ++i) {
+    if (!(values[i] / step > (i == 0 ? kBegun : values[i - 1] / step))) return std::nullopt;
+  }
+  const bool soon = times[first] <= kSoon * times.back();
+  return soon && counts_from_step(times) ? std::optional(first) : std::nullopt;
+}
+
+/// Time at which half of a step is reached, which rises from 0 at time 0.
+double half_risen(const std::vector<double>& values, const std::vector<double>& times,
+                  std::size_t rising) {
+  const double half = 0.5 * values[rising];
+  double before = 0.0, at = 0.0;
+  std::size_t i = 0;
+  for (; std::abs(values[i]) < std::abs(half); ++i) {
+    before = values[i];
+    at = times[i];
+  }
+  return at + (times[i] - at) * (half - before) / (values[i] - before);
+}
+
+/// True if a reading relaxes from a row on: the mean of its last quarter is clearly smaller.
+bool relaxes(const std::vector<double>& values, std::size_t from) {
+  constexpr double kClearly = 0.95;
+  const std::size_t last = std::max<std::size_t>((values.size() - from) / 4, 1);
+  const double sum =
+      std::accumulate(values.end() - static_cast<std::ptrdiff_t>(last), values.end(), 0.0);
+  return sum / static_cast<double>(last) / values[from] < kClearly;
 }
 
 }  // namespace
@@ -92,8 +141,7 @@ void keep_time_window(ImportedSeries& series, const std::string& file,
                                                  significant(*options.step_time_s, 9))));
 }
 
-void resolve_kept_step(ImportedSeries& series) {
-  constexpr double kKept = 0.02;  // of its mean, from the smallest to the largest
+std::size_t resolve_kept_step(ImportedSeries& series, const ImportOptions& options) {
   const auto column = [&](Quantity quantity) {
     return std::find_if(series.columns.begin(), series.columns.end(), [&](const auto& c) {
       return c.quantity == quantity && c.bound == Bound::value;
@@ -105,13 +153,13 @@ void resolve_kept_step(ImportedSeries& series) {
   const auto end = series.columns.end();
   const bool sd =
       std::any_of(series.columns.begin(), end, [](const auto& c) { return c.bound == Bound::sd; });
-  if (time == end || strain == end || stress == end || sd || time->values.front() < 0.0) return;
-  const auto kept = [](const std::vector<double>& values) {
-    const auto [low, high] = std::minmax_element(values.begin(), values.end());
-    return *low * *high > 0.0 && *high - *low <= kKept * std::abs(0.5 * (*low + *high));
-  };
-  const bool relaxation = kept(strain->values);
-  if (!relaxation && !kept(stress->values)) return;
+  if (time == end || strain == end || stress == end || sd || time->values.front() < 0.0) return 0;
+  const auto loaded = rows_before_kept(stress->values, time->values);
+  auto strained = rows_before_kept(strain->values, time->values);
+  // A strain that comes to rest may be an answer, too; a stress that does so always may be.
+  if (strained && *strained > 0 && !relaxes(stress->values, *strained)) strained.reset();
+  const bool relaxation = strained && (*strained == 0 || loaded != 0U);
+  if (!relaxation && loaded != 0U) return 0;
   ImportedColumn& answer = relaxation ? *stress : *strain;
   const ImportedColumn& step = relaxation ? *strain : *stress;
   for (std::size_t i = 0; i < answer.values.size(); ++i) {
@@ -126,7 +174,20 @@ void resolve_kept_step(ImportedSeries& series) {
                                 "the times count from the step"
                               : "strain over the stress that is kept, to a creep compliance; the "
                                 "times count from the step"));
+  const std::size_t rising = relaxation ? *strained : 0;
+  const bool shifted = rising > 0 && !options.step_time_s;
+  const double begin = shifted ? half_risen(step.values, time->values, rising) : 0.0;
+  for (double& t : time->values) t -= begin;
+  time->shifted = time->shifted || shifted;
   series.columns.erase(relaxation ? strain : stress);
+  if (rising == 0) return 0;
+  const std::size_t rows = series.columns.front().values.size();
+  for (ImportedColumn& c : series.columns) keep_rows(c.values, rising, rows);
+  keep_rows(series.lines, rising, rows);
+  series.findings.push_back(ImportFinding::told_of(
+      "left out", fmt::format("the first {} rows, in which the strain still rises{}", rising,
+                              shifted ? "; the times count from half of the step" : "")));
+  return rising;
 }
 
 void sort_shuffled_rows(ImportedSeries& series) {
@@ -172,7 +233,7 @@ void leave_out_zero_at_step(ImportedSeries& series) {
   for (ImportedColumn& column : series.columns) keep_rows(column.values, 1, rows);
   keep_rows(series.lines, 1, rows);
   series.findings.push_back(
-      ImportFinding::told_of("left out", words + ", which is from before the step"));
+      ImportFinding::told_of("left out", words + ", taken as from before the step"));
 }
 
 bool counts_from_step(const std::vector<double>& times) {

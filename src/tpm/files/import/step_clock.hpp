@@ -12,9 +12,13 @@ void keep_time_window(ImportedSeries& series, const std::string& file,
                       const ImportOptions& options);
 
 /// Turns a strain that is kept from the first sample on, and its stress, into a relaxation modulus,
-/// and a stress that is kept, and its strain, into a creep compliance. Kept means within 2 %. Other
-/// series stay as they are.
-void resolve_kept_step(ImportedSeries& series);
+/// and a stress that is kept, and its strain, into a creep compliance. Kept means within 2 %. A
+/// strain may be reached in the first thousandth of the time, if the first sample already stands
+/// within the step, the clock counts from it, and the stress relaxes after it: these rows are left
+/// out, and the times count from where half of the step is reached (unless its time is stated).
+/// Other series stay as they are.
+/// @return how many rows are left out
+std::size_t resolve_kept_step(ImportedSeries& series, const ImportOptions& options);
 
 /// Sorts the rows of G(t) or J(t) by their times, if these are all different and fall so often that
 /// the rows are no specimens below each other.

@@ -74,12 +74,11 @@ class ExperimentResiduals final : public ResidualFunction {
   [[nodiscard]] std::optional<Eigen::VectorXd> drive_noise_slope(
       std::span<const double> natural) const;
   /// Errors of drives that were rounded to coarse steps (rounded_levels): readings of one level
-  /// share one error (RoundedLevels::error_sd), which the law answers as if it were motion. Of 8
-  /// draws of all these errors, what they add to the slope of half the sum of squares by the
-  /// estimated parameters, natural: the mean of their squares and products is the covariance of the
-  /// slope. The errors of a draw are +- one standard deviation, with signs that are uncorrelated
-  /// over the draws for the longest levels, the holds, and random for the others. Empty without
-  /// such drives.
+  /// share one error (RoundedLevels::error_sd), which the law answers as if it were motion. What
+  /// they add to the slope of half the sum of squares by the estimated parameters, natural: the sum
+  /// of the squares and products of these vectors is the covariance of the slope. One vector for
+  /// each hold, of one standard deviation; those of the levels that a motion passes, which are many
+  /// and small, are 8 draws of all of them, up or down at random. Empty without such drives.
   [[nodiscard]] std::vector<Eigen::VectorXd> drive_rounding_slopes(
       std::span<const double> natural) const;
   /// A copy with at most about `most` samples of each recording, evenly taken from the history and
@@ -116,8 +115,11 @@ class ExperimentResiduals final : public ResidualFunction {
   using MoveKnots = std::function<bool(const Experiment&, std::vector<Knot>&)>;
   /// A copy with other drives of its recordings; null if none was moved.
   [[nodiscard]] std::unique_ptr<ExperimentResiduals> with_moved_drives(const MoveKnots& move) const;
-  /// A copy with rounding errors of the drives; null if none was rounded.
-  [[nodiscard]] std::unique_ptr<ExperimentResiduals> with_other_rounding(std::size_t draw) const;
+  /// Error of a level in its standard deviations, by recording and level, and whether it is held.
+  using LevelError = std::function<double(std::size_t, std::size_t, bool)>;
+  /// A copy with rounding errors of the drives; null if no drive was rounded, or all errors are 0.
+  [[nodiscard]] std::unique_ptr<ExperimentResiduals> with_other_rounding(
+      const LevelError& error_of) const;
   /// A copy with that noise in every `every`-th sample from `first` on; null if there is none.
   [[nodiscard]] std::unique_ptr<ExperimentResiduals> with_noisier_drives(std::size_t first,
                                                                          std::size_t every) const;

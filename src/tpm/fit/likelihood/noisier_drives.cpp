@@ -1,7 +1,9 @@
 // Declared in tpm/fit/likelihood/experiment_residuals.hpp.
-#include <algorithm>
 #include <bit>
+#include <cmath>
 #include <functional>
+#include <map>
+#include <utility>
 
 #include "tpm/base/namespaces.hpp"
 #include "tpm/base/random.hpp"
@@ -67,40 +69,62 @@ std::unique_ptr<ExperimentResiduals> ExperimentResiduals::with_noisier_drives(
 }
 
 std::unique_ptr<ExperimentResiduals> ExperimentResiduals::with_other_rounding(
-    std::size_t draw) const {
-  Random random(kRoundingSeed);  // the same signs in every draw
+    const LevelError& error_of) const {
+  std::size_t recording = 0;
   return with_moved_drives([&](const Experiment&, std::vector<Knot>& knots) {
     std::vector<double> values;
     for (const Knot& knot : knots) values.push_back(knot.value);
     const RoundedLevels rounded = rounded_levels(values);
-    std::vector<RoundedLevel> levels = rounded.levels;
-    std::ranges::stable_sort(levels, std::greater{},
-                             [](const RoundedLevel& l) { return l.size(); });
-    for (std::size_t rank = 0; rank < levels.size(); ++rank) {
-      // Rows of a Hadamard matrix: draws of the longest levels are uncorrelated with each other.
-      const bool turned = std::popcount(draw & (rank % kDraws)) % 2 == 1;
-      const bool up = turned != (random.below(2) == 1);
-      const double sd = rounded.error_sd(levels[rank], knots.size());
-      const double off = up ? sd : -sd;
-      for (std::size_t i = levels[rank].first; i < levels[rank].end; ++i) knots[i].value += off;
+    bool moved = false;
+    for (std::size_t l = 0; l < rounded.levels.size(); ++l) {
+      const RoundedLevel& level = rounded.levels[l];
+      const double share = error_of(recording, l, level.held(knots.size()));
+      if (share == 0.0) continue;
+      moved = true;
+      const double off = share * rounded.error_sd(level, knots.size());
+      for (std::size_t i = level.first; i < level.end; ++i) knots[i].value += off;
     }
-    return !levels.empty();
+    ++recording;
+    return moved;
   });
 }
 
 std::vector<Eigen::VectorXd> ExperimentResiduals::drive_rounding_slopes(
     std::span<const double> natural) const {
+  std::vector<std::unique_ptr<ExperimentResiduals>> others;
+  std::vector<std::pair<std::size_t, std::size_t>> holds;
+  Random random(kRoundingSeed);  // the same signs in every draw
+  std::map<std::pair<std::size_t, std::size_t>, std::size_t> passed;
+  const auto listed = with_other_rounding([&](std::size_t recording, std::size_t level, bool held) {
+    if (held) holds.emplace_back(recording, level);
+    if (!held)
+      passed.emplace(std::pair{recording, level},
+                     random.below(2) * kDraws + passed.size() % kDraws);
+    return held ? 0.0 : 1.0;
+  });
+  for (const auto& hold : holds) {
+    others.push_back(with_other_rounding([&](std::size_t recording, std::size_t level, bool) {
+      return hold == std::pair{recording, level} ? 1.0 : 0.0;
+    }));
+  }
+  for (std::size_t draw = 0; listed && draw < kDraws; ++draw) {
+    others.push_back(with_other_rounding([&](std::size_t recording, std::size_t level, bool held) {
+      if (held) return 0.0;
+      // Rows of a Hadamard matrix, by turns: draws of eight levels are uncorrelated.
+      const std::size_t row = passed.at({recording, level});
+      const bool up = std::popcount(draw & (row % kDraws)) % 2 == (row < kDraws ? 0 : 1);
+      return (up ? 1.0 : -1.0) / std::sqrt(static_cast<double>(kDraws));
+    }));
+  }
   Eigen::VectorXd before, after;
   RowMatrix slopes;
-  std::vector<Eigen::VectorXd> draws;
-  for (std::size_t draw = 0; draw < kDraws; ++draw) {
-    const auto other = with_other_rounding(draw);
-    if (!other) return {};
-    if (draws.empty() && !evaluate(natural, before, &slopes)) return {};
+  std::vector<Eigen::VectorXd> moved;
+  for (const auto& other : others) {
+    if (moved.empty() && !evaluate(natural, before, &slopes)) return {};
     if (!other->evaluate(natural, after, nullptr)) return {};
-    draws.emplace_back(slopes.transpose() * (after - before));
+    moved.emplace_back(slopes.transpose() * (after - before));
   }
-  return draws;
+  return moved;
 }
 
 std::optional<Eigen::VectorXd> ExperimentResiduals::drive_noise_slope(

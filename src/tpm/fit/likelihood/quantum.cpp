@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <set>
 #include <utility>
 #include <vector>
 
@@ -48,7 +49,6 @@ double hidden_noise_variance(double degrees) {
 RoundedLevels rounded_levels(std::span<const double> readings) {
   constexpr double kCoarse = 1e-4;     // of the range
   constexpr double kOneLevel = 0.5;    // of the step
-  constexpr std::size_t kHold = 20;    // parts of the readings: a level of one is no motion
   constexpr std::size_t kFewest = 20;  // levels of a motion: fewer may be stairs that were imposed
   constexpr double kOfSeveral = 0.2;   // of these levels
   RoundedLevels rounded;
@@ -63,13 +63,15 @@ RoundedLevels rounded_levels(std::span<const double> readings) {
     levels.back().end = i + 1;
   }
   std::size_t passed = 0, several = 0;
+  std::set<long long> different;
   for (const RoundedLevel& level : levels) {
-    if (kHold * level.size() > readings.size()) continue;
+    if (level.held(readings.size())) continue;
     ++passed;
     several += level.size() > 1;
+    different.insert(std::llround((readings[level.first] - *low) / step));
   }
   const bool stairs = static_cast<double>(several) >= kOfSeveral * static_cast<double>(passed);
-  if (passed < kFewest || !stairs) return rounded;
+  if (different.size() < kFewest || !stairs) return rounded;
   return {step, std::move(levels)};
 }
 

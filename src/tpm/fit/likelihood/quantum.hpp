@@ -21,6 +21,11 @@ struct RoundedLevel {
   std::size_t first = 0, end = 0;
 
   [[nodiscard]] std::size_t size() const { return end - first; }
+  /// True for a level of more than a twentieth of `count` readings: no motion passes it.
+  [[nodiscard]] bool held(std::size_t count) const {
+    constexpr std::size_t kHold = 20;
+    return kHold * size() > count;
+  }
 };
 
 /// A drive that was rounded to coarse steps.
@@ -33,17 +38,15 @@ struct RoundedLevels {
   /// The same of the mean error of a level among `count` readings: errors of n readings of a level
   /// that a motion passes are spread evenly over the step, which leaves q / (n sqrt(12)).
   [[nodiscard]] double error_sd(const RoundedLevel& level, std::size_t count) const {
-    constexpr std::size_t kHold = 20;  // parts of the readings: a level of one is no motion
-    const bool passed = kHold * level.size() <= count;
-    return error_sd() / (passed ? static_cast<double>(level.size()) : 1.0);
+    return error_sd() / (level.held(count) ? 1.0 : static_cast<double>(level.size()));
   }
 };
 
 /// The steps of a drive that was rounded: its readings lie on a grid of at least 1e-4 of its range,
-/// and of at least 20 levels that it passes (each for less than a twentieth of the readings) at
-/// least a fifth hold several readings. Fewer may be stairs that were imposed; and a drive that
-/// passes another level with every reading need not be rounded, though it may lie on a grid, as an
-/// exact ramp does.
+/// it passes at least 20 different levels (each for less than a twentieth of the readings), and at
+/// least a fifth of these hold several readings. Fewer may be stairs or cycles that were imposed;
+/// and a drive that passes another level with every reading need not be rounded, though it may lie
+/// on a grid, as an exact ramp does.
 [[nodiscard]] RoundedLevels rounded_levels(std::span<const double> readings);
 
 /// Relative error of a reading by computing: responses and minima are exact to about 1e-10, and no

@@ -24,6 +24,13 @@ struct UncertainCoordinates {
 /// the ones of the fit.
 [[nodiscard]] UncertainCoordinates fitted_coordinates(const LawFile& law, Placement placement);
 
+/// Leaves a parameter of the law out of what is uncertain of it.
+void leave_out(UncertainCoordinates& u, std::size_t place);
+
+/// True if recordings of a stretch were fitted together with slack lengths of their own: the law
+/// has their mean.
+[[nodiscard]] bool has_own_slack(const LawFile& law);
+
 /// d response / d coordinate of those places.
 [[nodiscard]] Eigen::MatrixXd coordinate_slopes(const Response& response,
                                                 const UncertainCoordinates& u,

@@ -20,20 +20,6 @@
 namespace tpm::fit {
 namespace {
 
-/// Leaves a parameter of the law out of what is uncertain of it.
-void leave_out(UncertainCoordinates& u, std::size_t place) {
-  const auto found = std::ranges::find(u.place, place);
-  if (found == u.place.end()) return;
-  const auto at = found - u.place.begin();
-  u.place.erase(found);
-  u.coordinate.erase(u.coordinate.begin() + at);
-  std::vector<Eigen::Index> kept;
-  for (Eigen::Index i = 0; i < u.root.rows(); ++i) {
-    if (i != at) kept.push_back(i);
-  }
-  u.root = Eigen::MatrixXd(u.root(kept, Eigen::all));
-}
-
 /// Adds the directions in which contact and offset of the recording move: with the material (they
 /// are found for it by least squares), and with the recording's own noise.
 void add_own_directions(UncertainCoordinates& u, const OwnPlacement& own, const Model& model,
@@ -87,16 +73,6 @@ const FittedFile* fitted_file(const LawFile& law, const PreparedRecording& recor
   if (sha256.empty()) return nullptr;
   const auto found = std::ranges::find(data, sha256, &FittedFile::sha256);
   return found != data.end() ? &*found : nullptr;
-}
-
-/// True if recordings of a stretch were fitted together with slack lengths of their own: the law
-/// has their mean.
-bool has_own_slack(const LawFile& law) {
-  if (law.spec.drive != Quantity::relative_length || !law.uncertainty) return false;
-  const std::vector<FittedFile>& files = law.uncertainty->data;
-  return std::ranges::any_of(files, [&](const FittedFile& file) {
-    return file.contact && *file.contact != *files.front().contact;
-  });
 }
 
 /// The placement of one of several recordings that were fitted together.
@@ -324,6 +300,30 @@ LawPrediction predict_recording_by(const Model& model, const LawFile& law,
   }
   compare(p, law, recording);
   return p;
+}
+
+void leave_out(UncertainCoordinates& u, std::size_t place) {
+  const auto found = std::ranges::find(u.place, place);
+  if (found == u.place.end()) return;
+  const auto at = found - u.place.begin();
+  u.place.erase(found);
+  u.coordinate.erase(u.coordinate.begin() + at);
+  std::vector<Eigen::Index> kept;
+  for (Eigen::Index i = 0; i < u.root.rows(); ++i) {
+    if (i != at) kept.push_back(i);
+  }
+  u.root = Eigen::MatrixXd(u.root(kept, Eigen::all));
+}
+
+bool has_own_slack(const LawFile& law) {
+  if (law.spec.drive != Quantity::relative_length || !law.uncertainty) return false;
+  std::optional<double> first;
+  for (const FittedFile& file : law.uncertainty->data) {
+    if (!file.contact) continue;
+    if (first && *file.contact != *first) return true;
+    first = file.contact;
+  }
+  return false;
 }
 
 }  // namespace tpm::fit

@@ -18,7 +18,6 @@ constexpr std::size_t kFewestCarried = 10;
 /// which no residual shows.
 double unseen_rounding(std::span<const double> drive, std::span<const double> fitted,
                        double noise) {
-  constexpr std::size_t kHold = 20;  // parts of the readings
   const RoundedLevels rounded = rounded_levels(drive);
   const double variance = rounded.error_sd() * rounded.error_sd();
   if (!(variance > noise)) return 0.0;
@@ -26,7 +25,7 @@ double unseen_rounding(std::span<const double> drive, std::span<const double> fi
   for (std::size_t i = 0; i < fitted.size();) {
     std::size_t end = i + 1;
     while (end < fitted.size() && std::abs(fitted[end] - fitted[i]) < 0.5 * rounded.step) ++end;
-    if (kHold * (end - i) <= fitted.size()) moving += end - i;
+    if (!RoundedLevel{i, end}.held(fitted.size())) moving += end - i;
     i = end;
   }
   return (variance - noise) * static_cast<double>(moving) / static_cast<double>(fitted.size());

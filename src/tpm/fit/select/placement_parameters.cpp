@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 #include "tpm/base/quantity_text.hpp"
 #include "tpm/base/text.hpp"
@@ -40,9 +41,8 @@ bool contact_is_seen(const LawSpec& law, const PreparedRecording& r) {
   return !r.phases.preloaded && r.phases.contact_found && contact_s >= r.from_s;
 }
 
-/// True if a stretched strip is slack at first, and the recording shows where it becomes taut: its
-/// stress begins to rise after 2 % of the stretch or later.
-bool shows_slack(const PreparedRecording& r) {
+/// Stretch at which the stress of a strip begins to rise; none if it does so at once.
+std::optional<double> onset_of_stress(const PreparedRecording& r) {
   constexpr double kCreeps = 0.01;  // part of the range that a still drive may creep
   constexpr std::size_t kSustained = 5, kOfSamples = 8;
   const Recording& read = r.recording;
@@ -52,7 +52,24 @@ bool shows_slack(const PreparedRecording& r) {
   const data::Touch touch = data::find_touch(
       {read.drive, read.response, pieces, r.phases.noise_sd_estimate, std::min(kSustained, most)},
       std::nullopt);
-  return touch.index && !touch.instantaneous;
+  if (!touch.index || touch.instantaneous) return std::nullopt;
+  return read.drive[*touch.index];
+}
+
+/// True if stresses begin to rise at different stretches, by more than 2 % of the shortest range.
+/// Under a bent law they leave the noise late, but those of one slack length at one stretch.
+bool have_own_slack(std::span<const PreparedRecording> recordings) {
+  constexpr double kApart = 0.02;
+  double least = std::numeric_limits<double>::infinity(), most = -least, range = least;
+  for (const PreparedRecording& r : recordings) {
+    if (r.load_imposed) continue;
+    const std::optional<double> onset = onset_of_stress(r);
+    if (!onset) continue;
+    least = std::min(least, *onset);
+    most = std::max(most, *onset);
+    range = std::min(range, r.phases.peak_drive - r.recording.drive.front());
+  }
+  return most - least > kApart * range;
 }
 
 /// Part of the travel by which bounds leave a held parameter free.
@@ -255,17 +272,17 @@ void add_free_placement(FitConfig& config, const LawModel& model, const Prepared
   if (options.measured) take_level_before_load(config, r);
 }
 
-/// Slack lengths of a stretch: one of each of several recordings that show it (the strip may have
-/// been gripped again, or be another one), and one for all others, which do not.
+/// Slack lengths of a stretch: one of each recording that shows it where they differ (the strip may
+/// have been gripped again, or be another one), and one for all others.
 void add_slack_lengths(FitConfig& config, const LawModel& model,
                        std::span<const PreparedRecording> recordings) {
   const std::size_t contact = model.index("contact");
-  const bool several = recordings.size() > 1;
+  const bool own = have_own_slack(recordings);
   std::vector<std::size_t> taut;
   for (std::size_t i = 0; i < recordings.size(); ++i) {
     const PreparedRecording& r = recordings[i];
     if (r.load_imposed) continue;
-    if (several && shows_slack(r)) {
+    if (own && onset_of_stress(r)) {
       add_automatic(config,
                     slack_length_bounds(model.spec(), r, fmt::format("slack_length {}", r.name)),
                     {{contact, {i}}});

@@ -111,13 +111,14 @@ Series motion_line(const std::string& label, const Recording& r, double contact,
   return s;
 }
 
-/// Where contact was in the fit: the slack length of a strip, and the contact of a recording that
-/// was fitted alone, are the law's.
+/// Where contact was in the fit: the slack length that strips share, and the contact of a recording
+/// that was fitted alone, are the law's.
 double contact_in_fit(const LawFile& law, const CalibrationData::File& file) {
   const PreparedRecording& r = file.recording.value();
   if (is_load(r.recording.drive_quantity)) return r.phases.floor_response;
   const auto& data = law.uncertainty->data;
-  if (law.spec.drive == Quantity::relative_length || data.size() == 1) {
+  const bool of_specimen = law.spec.drive == Quantity::relative_length && !has_own_slack(law);
+  if (of_specimen || data.size() == 1) {
     return law.values[law.values.size() - 2];
   }
   const auto fitted = std::ranges::find(data, file.sha256, &FittedFile::sha256);

@@ -99,8 +99,10 @@ LawAlong::LawAlong(const LawFile& law, const PreparedRecording& recording, const
   const double value = law.values[law.values.size() - 2];
   const bool known =
       std::ranges::find(coordinates_.place, parameters.size() - 2) != coordinates_.place.end();
+  const bool own = has_own_slack(law);
   contact_of_law_ =
-      !load_imposed_ && !belongs_to_recording(law.spec, contact) && (known || value != 0.0);
+      !load_imposed_ && !own && !belongs_to_recording(law.spec, contact) && (known || value != 0.0);
+  if (own) leave_out(coordinates_, parameters.size() - 2);
 }
 
 Protocol LawAlong::driven(std::vector<DelayedRise> rises) const {

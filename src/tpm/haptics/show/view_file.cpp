@@ -35,11 +35,12 @@ FirstBytes first_bytes(std::string_view bytes) {
 }
 
 /// Without telling anyone that the file was read: most files of a folder are nothing to view, and
-/// one of them may be the page that is written.
+/// one of them may be the page that is written. Throws Error(bad_input) if it cannot be read.
 std::string beginning_of(const fs::path& file) {
   constexpr std::size_t kLooked = 512;
   std::string bytes(kLooked, '\0');
   std::ifstream in(file, std::ios::binary);
+  if (!in) throw bad_input(file.string(), "cannot be read", "a file that you may read");
   in.read(bytes.data(), kLooked);
   bytes.resize(static_cast<std::size_t>(in.gcount()));
   return bytes;
@@ -117,21 +118,34 @@ bool is_part_of(const FoundResult& part, const FoundResult& whole) {
   return part.kind == ResultKind::law && name == "law.json" && answer;
 }
 
-/// Its files, and those of the folders in it: of a specimen, a day, a fit.
-std::vector<fs::path> files_below(const fs::path& folder) {
-  std::vector<fs::path> files;
-  const auto options = fs::directory_options::skip_permission_denied;
-  for (auto entry = fs::recursive_directory_iterator(folder, options);
-       entry != fs::recursive_directory_iterator(); ++entry) {
-    if (entry->is_directory()) {
-      const bool hidden = entry->path().filename().string().starts_with('.');
-      if (hidden || entry.depth() >= kFoldersBelow) entry.disable_recursion_pending();
-    } else if (entry->is_regular_file()) {
-      files.push_back(entry->path());
+/// Adds its files, and those of the folders in it: of a specimen, a day, a fit. What cannot be
+/// read, and links to folders, which may lead in a circle, are told.
+void add_files_below(const fs::path& folder, int depth, std::vector<fs::path>& files,
+                     std::vector<NotShown>& not_shown) {
+  std::error_code error;
+  const auto tell = [&](const fs::path& path, const char* what, std::string expected) {
+    not_shown.push_back({path, bad_input(path.string(), what, expected)});
+  };
+  std::vector<fs::path> inside;
+  for (fs::directory_iterator entry(folder, error); !error && entry != fs::directory_iterator();
+       entry.increment(error)) {
+    inside.push_back(entry->path());
+  }
+  if (error) tell(folder, "cannot be read", "a folder that you may read");
+  std::ranges::sort(inside);
+  for (const fs::path& path : inside) {
+    std::error_code ignored;  // a link that leads nowhere is no file
+    if (fs::is_regular_file(path, ignored)) {
+      files.push_back(path);
+    } else if (fs::is_directory(path, ignored) && !path.filename().string().starts_with('.')) {
+      if (fs::is_symlink(path, ignored)) {
+        tell(path, "is a link to a folder, which is not followed",
+             "tpm view " + shell_word(path.string()));
+      } else if (depth < kFoldersBelow) {
+        add_files_below(path, depth + 1, files, not_shown);
+      }
     }
   }
-  std::ranges::sort(files);
-  return files;
 }
 
 /// True of a table that a result was written with: any beside JSON of tpm, the one that is called
@@ -173,8 +187,13 @@ FolderResults results_in(const fs::path& folder) {
   std::vector<FoundResult> found;
   std::vector<fs::path> tables;
   FolderResults results;
-  for (const fs::path& file : files_below(folder)) {
+  std::vector<fs::path> files;
+  add_files_below(folder, 0, files, results.not_shown);
+  for (const fs::path& file : files) {
+    bool notes = false;
     try {
+      const bool json = first_bytes(beginning_of(file)) == FirstBytes::json;
+      notes = json && file.extension() != ".json";  // they may begin like JSON
       const ResultKind kind = result_kind(file);
       const bool table = file.extension() == ".csv" || file.extension() == ".tsv";
       if (kind != ResultKind::none) {
@@ -184,7 +203,7 @@ FolderResults results_in(const fs::path& folder) {
       }
     } catch (const Error& error) {
       if (error.code() != ExitCode::bad_input) throw;
-      results.not_shown.push_back({file, error});
+      if (!notes) results.not_shown.push_back({file, error});
     }
   }
   std::ranges::sort(found, [](const FoundResult& a, const FoundResult& b) {
