@@ -155,10 +155,11 @@ std::size_t resolve_kept_step(ImportedSeries& series, const ImportOptions& optio
       std::any_of(series.columns.begin(), end, [](const auto& c) { return c.bound == Bound::sd; });
   if (time == end || strain == end || stress == end || sd || time->values.front() < 0.0) return 0;
   const auto loaded = rows_before_kept(stress->values, time->values);
-  auto strained = rows_before_kept(strain->values, time->values);
+  const auto strained = rows_before_kept(strain->values, time->values);
+  const std::size_t before = strained.value_or(0);
   // A strain that comes to rest may be an answer, too; a stress that does so always may be.
-  if (strained && *strained > 0 && !relaxes(stress->values, *strained)) strained.reset();
-  const bool relaxation = strained && (*strained == 0 || loaded != 0U);
+  const bool rises = strained && before > 0 && loaded != 0U && relaxes(stress->values, before);
+  const bool relaxation = rises || strained == 0U;
   if (!relaxation && loaded != 0U) return 0;
   ImportedColumn& answer = relaxation ? *stress : *strain;
   const ImportedColumn& step = relaxation ? *strain : *stress;
@@ -174,7 +175,7 @@ std::size_t resolve_kept_step(ImportedSeries& series, const ImportOptions& optio
                                 "the times count from the step"
                               : "strain over the stress that is kept, to a creep compliance; the "
                                 "times count from the step"));
-  const std::size_t rising = relaxation ? *strained : 0;
+  const std::size_t rising = rises ? before : 0;
   const bool shifted = rising > 0 && !options.step_time_s;
   const double begin = shifted ? half_risen(step.values, time->values, rising) : 0.0;
   for (double& t : time->values) t -= begin;
