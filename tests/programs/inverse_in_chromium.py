@@ -193,7 +193,7 @@ def check_client(hand, client, tpm, served, name, folder):
         assert "SIMULATED" in seen["texts"]["identity"], seen["texts"]
         assert seen["texts"]["title"] == RUN["title"], seen["texts"]
         fits(client, "client", folder, lambda s: True)
-        return True
+        return not look(client)["texts"]["status"].startswith(over)
     finally:
         run.close()
 

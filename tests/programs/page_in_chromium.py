@@ -240,6 +240,29 @@ def check(seen, address, chromium, session):
     assert not strangers, strangers
 
 
+# How a session ends whose cause takes a sentence, shown on the page: what does not fit.
+LONG_END = """(() => {
+  showState({...state, over: true, cause: "connection lost",
+             detail: "no message of the device for 1.003 s at cycle 12345; expected one within the cycle timeout of 1 s, set as limits.cycle_timeout"});
+  const root = document.documentElement, wide = root.clientWidth;
+  const out = ["title", "device", "identity", "status"].filter(id => {
+    const box = document.getElementById(id).getBoundingClientRect();
+    return box.left < 0 || box.right > wide + 0.5; });
+  const end = document.getElementById("status");
+  if (end.scrollWidth > end.clientWidth + 1 || end.scrollHeight > end.clientHeight + 1) out.push("the end's text");
+  if (root.scrollWidth > wide) out.push("the page: " + root.scrollWidth + " of " + wide);
+  return out.join(", "); })()"""
+
+
+def check_long_end(chromium):
+    for wide in (1400, 1100, 400):
+        chromium.call("Emulation.setDeviceMetricsOverride", width=wide, height=900, deviceScaleFactor=1, mobile=False)
+        time.sleep(0.3)
+        answer = chromium.call("Runtime.evaluate", expression=LONG_END)
+        assert "exceptionDetails" not in answer, answer
+        assert answer["result"]["value"] == "", (wide, answer["result"]["value"])
+
+
 def attempt(tpm, program, told, given, shot):
     with tempfile.TemporaryDirectory(ignore_cleanup_errors=True) as name:
         folder = Path(name)
@@ -252,6 +275,8 @@ def attempt(tpm, program, told, given, shot):
             stalled = seen[-1]["texts"]["status"].startswith(("stopped: watchdog", "stopped: overrun", "stopped: cycle timeout"))
             if shot is None and not stalled:
                 check(seen, address, chromium, told)
+            if shot is None:
+                check_long_end(chromium)
             return stalled, len(seen)
         finally:
             chromium.close()

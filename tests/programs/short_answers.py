@@ -41,13 +41,22 @@ class Checks:
         elif len(lines) > MOST or lines[-1] != f"next: {command}":
             self.faults.append(f"{name}: {len(lines)} lines, ends with '{lines[-1]}'")
 
-    def check(self, words, warnings, codes=(0,), measured=False):
+    def check(self, words, warnings, codes=(0,), timed=False):
         """@param warnings  of the JSON: a function of the document
-        @param measured  whether each run measures other numbers: these are not compared"""
-        shown = (lambda text: re.sub(r"[0-9.]+", "#", text)) if measured else (lambda text: text)
-        said, told = self.run(*words), self.run(*words, "--format", "json")
+        @param timed  whether each run measures the machine: its numbers are not compared"""
+        shown = (lambda text: re.sub(r"[0-9.]+", "#", text)) if timed else (lambda text: text)
+
+        def left_out():
+            """What the JSON warns of, and the text of another run does not."""
+            return [one for one in warnings(json.loads(told.stdout)) if shown(one) not in shown(said.stdout + said.stderr)]
+
+        for _ in range(10 if timed else 1):  # the machine may stall in one of two runs that measure it
+            said, told = self.run(*words), self.run(*words, "--format", "json")
+            alike = said.returncode == told.returncode and said.returncode in codes
+            if alike and not left_out():
+                break
         name = " ".join(map(str, words))
-        if said.returncode not in codes or told.returncode != said.returncode:
+        if not alike:
             self.faults.append(f"{name}: ends with {said.returncode} and {told.returncode}: {said.stderr[-300:]}")
             return
         self.answers += 1
@@ -58,9 +67,7 @@ class Checks:
             self.faults.append(f"{name}: prints JSON")
         if "more: --verbose" not in lines[-1]:
             self.faults.append(f"{name}: ends with '{lines[-1]}'")
-        for words_of_one in warnings(json.loads(told.stdout)):
-            if shown(words_of_one) not in shown(said.stdout + said.stderr):
-                self.faults.append(f"{name}: leaves out the warning '{words_of_one}'")
+        self.faults += [f"{name}: leaves out the warning '{one}'" for one in left_out()]
         command = tuple(words[:2] if words[0] in ("hil", "paper") else words[:1])
         if command not in self.verbose and len(self.run(*words, "--verbose").stdout) <= 0.5 * len(said.stdout):
             self.faults.append(f"{name}: says less with --verbose")
@@ -112,7 +119,7 @@ def main():
         for session in sorted((root / "configs").glob("hil_*.json")):
             if session.name in LONG_PLANNED:
                 continue
-            checks.check(["hil", "check", session, "--duration", "0.2 s"], lambda d: [d["session"]["title"]], (0, 1))
+            checks.check(["hil", "check", session, "--duration", "0.2 s"], lambda d: [d["session"]["title"]], (0, 1), True)
         for design in ("design_liver.json", "design_meat.json"):
             checks.check(["design", root / "configs" / design, "--repetitions", "10"],
                          lambda d: d["summary"] + remarks(d["check"]))
