@@ -1,4 +1,7 @@
 // Recordings from one path, and their phases.
+#include <fmt/format.h>
+
+#include <algorithm>
 #include <catch2/catch.hpp>
 #include <cmath>
 #include <random>
@@ -445,4 +448,30 @@ TEST_CASE("a number that is none is named with line and column however it is rea
   write_file(folder / "f.csv", "Time (s),Depth (mm),Force (N)\n0,0,0\n1,1,x\n");
   CHECK_THROWS_WITH(read_recording_file(folder / "f.csv"),
                     Catch::Contains("f.csv:3: column 3 'Force': 'x' is not a finite number"));
+}
+
+TEST_CASE("Even rows under a coarse clock get their times back, others become their mean") {
+  const TempFolder folder;
+  // 7 ms a row, a clock of 0.1 s that truncates; contact at 1.0 s.
+  const auto written = [&](const std::string& name, double pause_s) {
+    std::string text = "Time (s),Force (N),Depth (mm)\n";
+    for (int i = 0; i < 400; ++i) {
+      const double t = 7e-3 * i + (i < 200 ? 0.0 : pause_s);
+      const double depth = std::max(t - 1.0, 0.0);
+      text +=
+          fmt::format("{:.1f},{:.6f},{:.6f}\n", std::floor(10.0 * t) / 10.0, 2.0 * depth, depth);
+    }
+    write_file(folder / name, text);
+    return read_recording_file(folder / name, {});
+  };
+  const RecordingFile even = written("even.csv", 0.0);
+  REQUIRE(even.recording.time_s.size() == 400);
+  for (std::size_t i = 0; i < 400; ++i) {
+    CHECK_THAT(even.recording.time_s[i], WithinAbs(7e-3 * static_cast<double>(i), 4e-3));
+  }
+  CHECK_THAT(columns_words(even.findings), Catch::Contains("the clock counts in steps of 0.1 s") &&
+                                               Catch::Contains("rows at even times"));
+  const RecordingFile paused = written("paused.csv", 3.0);
+  CHECK(paused.recording.time_s.size() < 60);
+  CHECK_THAT(columns_words(paused.findings), Catch::Contains("rows of one time became one"));
 }

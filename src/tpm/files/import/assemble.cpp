@@ -2,7 +2,9 @@
 
 #include <fmt/format.h>
 
+#include <Eigen/Core>
 #include <algorithm>
+#include <limits>
 #include <numeric>
 
 #include "tpm/base/namespaces.hpp"
@@ -103,11 +105,50 @@ double mean_of_rows(const std::vector<double>& values, std::size_t first, std::s
          static_cast<double>(end - first);
 }
 
-/// A clock that is coarser than the sampling stamps several rows alike: they become one, their
-/// mean. Standard deviations stay as they are: what a machine states need not be independent.
-void average_repeated_times(ImportedSeries& series) {
-  const ImportedColumn* time = find(series, Quantity::time);
-  if (time == nullptr || series.lines.empty() || !series.segments.empty()) return;
+/// Rows at even times that a coarse clock rounded or truncated get these times back, but for what
+/// the clock itself is late: all its stamps then lie within one of its steps of a straight line
+/// over the rows. A mean of rows would round off the corners of a drive and the contact.
+/// @param time  in order
+/// @param stamps  different times in it, fewer than rows
+/// @returns what was found; none where the rows are not even, or too few tell
+std::optional<ImportFinding> spread_even_rows(ImportedColumn& time, std::size_t stamps) {
+  constexpr std::size_t kFewestStamps = 20;  // a pause or a second rate does not hide among them
+  constexpr double kFewestRepeated = 0.1;    // of the rows: one marker's double row is no clock
+  constexpr double kSlack = 1.02;  // of a step: the line is fitted, and stamps are rounded
+  const auto rows = static_cast<Eigen::Index>(time.values.size());
+  const std::size_t repeated = time.values.size() - stamps;
+  if (stamps < kFewestStamps ||
+      static_cast<double>(repeated) < kFewestRepeated * static_cast<double>(rows)) {
+    return std::nullopt;
+  }
+  const Eigen::Map<const Eigen::ArrayXd> clock(time.values.data(), rows);
+  double step = std::numeric_limits<double>::infinity();
+  for (Eigen::Index i = 1; i < rows; ++i) {
+    if (clock[i] > clock[i - 1]) step = std::min(step, clock[i] - clock[i - 1]);
+  }
+  const Eigen::ArrayXd place = Eigen::ArrayXd::LinSpaced(rows, 0.0, static_cast<double>(rows - 1));
+  const Eigen::ArrayXd from_middle = place - place.mean();
+  const double period = (from_middle * clock).sum() / from_middle.square().sum();
+  const Eigen::ArrayXd off = clock - period * place;
+  if (off.maxCoeff() - off.minCoeff() > kSlack * step) return std::nullopt;
+  const double first = clock[0];
+  for (Eigen::Index i = 0; i < rows; ++i) {
+    time.values[static_cast<std::size_t>(i)] = first + period * place[i];
+  }
+  time.shifted = true;  // computed: not the digits of the file
+  return ImportFinding::told_of(
+      "repeated times",
+      fmt::format("{} of {} rows have the time of the row before: the clock counts in steps of {}, "
+                  "and all stamps fit rows at even times, one every {}; these are the times",
+                  repeated, rows, with_unit(step, time.unit), with_unit(period, time.unit)));
+}
+
+/// A clock that is coarser than the sampling stamps several rows alike: even rows get their times
+/// back, others become one, their mean. Standard deviations stay as they are: what a machine states
+/// need not be independent.
+void resolve_repeated_times(ImportedSeries& series) {
+  const auto time = std::ranges::find(series.columns, Quantity::time, &ImportedColumn::quantity);
+  if (time == series.columns.end() || series.lines.empty() || !series.segments.empty()) return;
   const std::vector<double> stamps = time->values;
   if (stamps.size() < 2 || !std::ranges::is_sorted(stamps)) return;
   std::vector<std::size_t> begin{0};
@@ -115,6 +156,10 @@ void average_repeated_times(ImportedSeries& series) {
     if (stamps[i] != stamps[i - 1]) begin.push_back(i);
   }
   if (begin.size() == stamps.size() || begin.size() < 2) return;
+  if (auto even = spread_even_rows(*time, begin.size())) {
+    series.findings.push_back(std::move(*even));
+    return;
+  }
   begin.push_back(stamps.size());
   std::vector<int> lines;
   for (std::size_t k = 0; k + 1 < begin.size(); ++k) lines.push_back(series.lines[begin[k]]);
@@ -271,7 +316,7 @@ void check_and_measure(ImportedSeries& series, const std::string& file) {
     add_spectrum_measures(series);
     return;
   }
-  average_repeated_times(series);
+  resolve_repeated_times(series);
   require_times(series, file);
   require_not_negative(series, file, observed(series).quantity, Bound::sd);
   add_measures(series);
