@@ -240,25 +240,52 @@ def check(seen, address, chromium, session):
     assert not strangers, strangers
 
 
-# How a session ends whose cause takes a sentence, shown on the page: what does not fit.
-LONG_END = """(() => {
-  showState({...state, over: true, cause: "connection lost",
-             detail: "no message of the device for 1.003 s at cycle 12345; expected one within the cycle timeout of 1 s, set as limits.cycle_timeout"});
-  const root = document.documentElement, wide = root.clientWidth;
-  const out = ["title", "device", "identity", "status"].filter(id => {
-    const box = document.getElementById(id).getBoundingClientRect();
-    return box.left < 0 || box.right > wide + 0.5; });
-  const end = document.getElementById("status");
-  if (end.scrollWidth > end.clientWidth + 1 || end.scrollHeight > end.clientHeight + 1) out.push("the end's text");
-  if (root.scrollWidth > wide) out.push("the page: " + root.scrollWidth + " of " + wide);
-  return out.join(", "); })()"""
+# The longest words that a session's file, a device and an end can have, with and without places to break; then what does
+# not fit, is cut or lies over another part.
+LONG_WORDS = """(() => {
+  const sentence = "no message of the device for 1.003 s at cycle 12345; expected one within the cycle timeout of 1 s, set as limits.cycle_timeout; ".repeat(2);
+  const name = "liver_of_specimen_17_under_the_instrument_".repeat(5), root = document.documentElement, wide = root.clientWidth;
+  const kept = [scene, state], phase = {...scene.phases[0], name, instruction: sentence};
+  const found = [];
+  const look = how => {
+    const parts = [...document.querySelectorAll("#title, #device, #identity, #status, #shown, #note, #guide > *, .row > *, #flags > *, h2")];
+    const guide = document.getElementById("guide"), frame = guide.getBoundingClientRect();
+    const boxes = parts.map(e => {
+      const words = document.createRange(); words.selectNodeContents(e);
+      const {left, right, top, bottom} = words.getBoundingClientRect(), scrolls = guide.contains(e);  // what scrolls is seen in its frame
+      return [e.id || e.textContent.slice(0, 20), e, {left, right, top: scrolls ? Math.max(top, frame.top) : top, bottom: scrolls ? Math.min(bottom, frame.bottom) : bottom}];
+    }).filter(([, e, box]) => box.right > box.left && box.bottom > box.top);
+    for (const [id, e, box] of boxes) {
+      if (box.left < -0.5 || box.right > wide + 0.5) found.push(how + ": outside: " + id);
+      if (getComputedStyle(e).overflowX !== "visible" && e.scrollWidth > e.clientWidth + 1) found.push(how + ": cut: " + id);
+    }
+    const alone = boxes.filter(([, e]) => !e.matches(".row, #flags"));
+    alone.forEach(([id, e, a], i) => { for (const [other, , b] of alone.slice(i + 1))
+      if (Math.min(a.right, b.right) - Math.max(a.left, b.left) > 1 && Math.min(a.bottom, b.bottom) - Math.max(a.top, b.top) > 1) found.push(how + ": " + id + " lies over " + other); });
+    if (guide.scrollHeight > guide.clientHeight + 1 && getComputedStyle(guide).overflowY !== "auto") found.push(how + ": the guide is cut");
+    if (root.scrollWidth > wide) found.push(how + ": the page is " + root.scrollWidth + " px wide");
+  };
+  for (const text of [name, sentence]) {
+    scene = {...kept[0], title: text, phases: kept[0].phases.map(() => ({...phase, name: text})), device: {...kept[0].device, name: text, serial: text},
+             tissue: {...kept[0].tissue, shown: text}};
+    showScene();
+    showState({...kept[1], over: false, cause: "none", begun: true, phase: 0, time_s: 0, flags: Object.fromEntries(Object.keys(kept[1].flags).map(k => [k, true]))});
+    look("running");
+    showState({...kept[1], over: false, cause: "none", begun: false, place: text});
+    look("waiting");
+    showState({...kept[1], over: true, cause: "connection lost", detail: text});
+    look("ended");
+  }
+  [scene, state] = kept;
+  showScene(); showState(state);
+  return found.join(", "); })()"""
 
 
-def check_long_end(chromium):
+def check_long_words(chromium):
     for wide in (1400, 1100, 400):
         chromium.call("Emulation.setDeviceMetricsOverride", width=wide, height=900, deviceScaleFactor=1, mobile=False)
         time.sleep(0.3)
-        answer = chromium.call("Runtime.evaluate", expression=LONG_END)
+        answer = chromium.call("Runtime.evaluate", expression=LONG_WORDS)
         assert "exceptionDetails" not in answer, answer
         assert answer["result"]["value"] == "", (wide, answer["result"]["value"])
 
@@ -276,7 +303,7 @@ def attempt(tpm, program, told, given, shot):
             if shot is None and not stalled:
                 check(seen, address, chromium, told)
             if shot is None:
-                check_long_end(chromium)
+                check_long_words(chromium)
             return stalled, len(seen)
         finally:
             chromium.close()
