@@ -221,6 +221,7 @@ TEST_CASE(
   const test::TempFolder folder;
   const test::VendorScript script(hand_in_place(folder) +
                                   "watchdog_by_clock 0\nfault hang 350 30\n");
+  const HilSession session = patient_session();
   SessionRunOptions options = on_the_clock(folder / "r");
   // Half a second after the call hung; or when the session is over.
   options.interrupted = [&, after = std::chrono::steady_clock::time_point::max()]() mutable {
@@ -228,7 +229,7 @@ TEST_CASE(
     if (script.event_ns("hang_over") > 0) after = std::min(after, now + 500ms);
     return now > after;
   };
-  (void)run_session(patient_session(), test::stand_in_choice(), options);
+  (void)run_session(session, test::stand_in_choice(), options);
   const HilRecording recording = read_recording(folder / "r");
   const double period_s = session.servo.period_s;
   double longest_s = 0.0;

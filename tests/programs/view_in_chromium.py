@@ -40,7 +40,7 @@ class Page:
         self.seconds = time.monotonic() - start
 
     def ready(self, what):
-        self.chromium.awaited("document.body && document.body.dataset.ready == 'yes'", 60, f"{what} does not get ready")
+        self.chromium.awaited("document.body && document.body.dataset.ready == 'yes'", 240, f"{what} does not get ready")
 
     def js(self, expression):
         answer = self.chromium.call("Runtime.evaluate", expression=expression, returnByValue=True)
