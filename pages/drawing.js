@@ -13,6 +13,13 @@ function ready(canvas) {
   g.font = "11px system-ui, 'DejaVu Sans', sans-serif";
   return [g, w, h];
 }
+/// A text, or as much of its beginning as fits.
+function fitted(g, text, width) {
+  if (g.measureText(text).width <= width) return text;
+  let n = text.length;
+  while (n > 0 && g.measureText(text.slice(0, n) + "\u2026").width > width) --n;
+  return text.slice(0, n) + "\u2026";
+}
 function niceStep(span, count) {
   const raw = span / count, p = Math.pow(10, Math.floor(Math.log10(raw))), m = raw / p;
   return (m < 1.5 ? 1 : m < 3 ? 2 : m < 7 ? 5 : 10) * p;

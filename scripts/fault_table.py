@@ -178,10 +178,10 @@ def run(tpm: Path, preload: Path, inputs: Path, command: Command, call: str, how
                        "XDG_CACHE_HOME": str(Path(name) / "cache")}
         try:
             done = subprocess.run([tpm, *command.arguments.split()], cwd=folder, env=environment,
-                                  stdin=subprocess.DEVNULL, capture_output=True, timeout=600)
+                                  stdin=subprocess.DEVNULL, capture_output=True, timeout=1200)
             code, said = done.returncode, done.stderr.decode(errors="replace")
         except subprocess.TimeoutExpired:
-            code, said = 1000, "no end within 600 s"
+            code, said = 1000, "no end within 1200 s"
         lines = mark.read_text().rstrip("\0").splitlines() if mark.exists() else []
         fired = next((line for line in lines if line.startswith("fired ")), "")
         calls = max((int(line.split()[1]) for line in lines if line.startswith("calls ")), default=0)

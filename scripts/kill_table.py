@@ -63,7 +63,7 @@ def tpm_in(folder: Path, tpm: Path, arguments: list, **environment) -> subproces
         program = [PYTHON, *(arguments if arguments[0] == "-c" else [SCRIPTS / arguments[0], *arguments[1:]])]
         environment = {"PYTHONDONTWRITEBYTECODE": "1", "MPLCONFIGDIR": str(Path(tempfile.gettempdir()) / "tpm-kill-matplotlib"),
                        **environment}
-    return subprocess.run(program, cwd=folder, stdin=subprocess.DEVNULL, capture_output=True, timeout=300,
+    return subprocess.run(program, cwd=folder, stdin=subprocess.DEVNULL, capture_output=True, timeout=1200,
                           env={**os.environ, "XDG_CACHE_HOME": str(folder.parent / "cache"), **environment})
 
 

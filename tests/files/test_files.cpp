@@ -393,7 +393,7 @@ TEST_CASE("A sweep for which the disk has no room is refused before its first ce
                  "axes": [{"parameter": "depth", "from": "1 mm", "to": "8 mm", "count": 1000000},
                           {"parameter": "spacing", "from": "10 mm", "to": "40 mm", "count": 1000000}],
                  "outputs": ["peak_force"]})");
-  const Ran ran = run_in(folder, "timeout -s INT 60 $TPM sweep s.json -o o.h5");
+  const Ran ran = run_in(folder, "timeout -s INT 600 $TPM sweep s.json -o o.h5");
   CHECK(ran.code == 5);
   CHECK_THAT(ran.said, Contains("o.h5.blocks: 1e+12 cells need") && Contains("the disk has"));
 }

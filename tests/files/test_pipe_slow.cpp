@@ -22,7 +22,7 @@ TEST_CASE("A mesh that is a pipe without a writer is refused") {
   write_file(folder / "s.json",
              R"({"organ": {"kind": "mesh", "mesh": "m.obj", "unit": "mm", "count": 40}})");
   const std::string line = "cd '" + folder.path().string() +
-                           "' && timeout 60 '" TPM_TEST_PROGRAM
+                           "' && timeout 600 '" TPM_TEST_PROGRAM
                            "' network check s.json > out 2> said";
   const int status = std::system(line.c_str());
   CHECK(WEXITSTATUS(status) == 3);

@@ -69,8 +69,8 @@ CheckAnswer answer_of_check(const std::string& arguments) {
 
 TEST_CASE("A check gives a cycle as long as its session does") {
   HilSession session;
-  session.cycle_timeout_s = 5.0;
-  CHECK(real_time_options(session, RealTimeWish::ignore, {}).cycle_timeout_s == 5.0);
+  session.cycle_timeout_s = 30.0;
+  CHECK(real_time_options(session, RealTimeWish::ignore, {}).cycle_timeout_s == 30.0);
   session.servo.most_late = 1001;
   session.servo.most_missed = 1'000'000;
   const CheckedStandIn stand_in("fault hang 100 2000\n");
@@ -79,22 +79,29 @@ TEST_CASE("A check gives a cycle as long as its session does") {
   CHECK(stand_in.happened("hang_over"));
   CHECK(check.outcome.cause == StopCause::finished);
   CHECK(check.outcome.busy.max_s() >= 2.0);
-  CHECK(check.cycle_timeout_s == 5.0);
-  CHECK_THAT(check.timing, Contains("not kept: a stall of 2"));
+  CHECK(check.cycle_timeout_s == 30.0);
+  // Of 2 s, or longer if the machine stalls where the call ends.
+  CHECK_THAT(check.timing, Contains("not kept: a stall of ") && Contains(" s leaves "));
 }
 
 TEST_CASE("A check in which a cycle hangs counts the cycles before it") {
   HilSession session;
   session.cycle_timeout_s = 0.5;
-  const CheckedStandIn stand_in("fault hang 300 2000\n");
-  const JitterCheck check =
-      check_jitter(device_without_a_file(), session, 60.0, RealTimeWish::ignore);
-  // The thread that is left behind has come back before its library gets another script.
-  for (int wait = 0; wait < 200 && !stand_in.happened("hang_over"); ++wait) {
-    std::this_thread::sleep_for(std::chrono::milliseconds(50));
+  JitterCheck check;
+  bool hung = false;
+  // A machine that stalls for half a second itself ends a check before the call hangs.
+  for (int tries = 0; tries < 5 && !hung; ++tries) {
+    const CheckedStandIn stand_in("fault hang 300 2000\n");
+    check = check_jitter(device_without_a_file(), session, 60.0, RealTimeWish::ignore);
+    // The thread that is left behind has come back before its library gets another script.
+    hung = stand_in.happened("hang");
+    for (int wait = 0; wait < 1000 && hung && !stand_in.happened("hang_over"); ++wait) {
+      std::this_thread::sleep_for(std::chrono::milliseconds(50));
+    }
+    REQUIRE(stand_in.happened("hang_over") == hung);
+    std::this_thread::sleep_for(std::chrono::milliseconds(300));
   }
-  REQUIRE(stand_in.happened("hang_over"));
-  std::this_thread::sleep_for(std::chrono::milliseconds(300));
+  REQUIRE(hung);
   const ServoOutcome& o = check.outcome;
   REQUIRE(o.cause == StopCause::cycle_timeout);
   CHECK(o.cycles > 0);

@@ -43,7 +43,7 @@ TEST_CASE("kill -9 at random moments: every recording opens and verifies up to t
     // The header stands in the file before threads and memory are prepared, rows from the first
     // cycle on.
     std::uintmax_t header = 0;
-    for (int wait = 0; wait < 2000; ++wait) {
+    for (int wait = 0; wait < 12'000; ++wait) {
       const std::uintmax_t size =
           std::filesystem::exists(file) ? std::filesystem::file_size(file) : 0;
       if (header > 0 && size > header) break;
@@ -78,6 +78,31 @@ TEST_CASE("kill -9 at random moments: every recording opens and verifies up to t
   CHECK(written_late <= test::allowed_cost("session.kills_with_a_second_unwritten"));
 }
 
+namespace {
+
+/// Status of a session that is sent a signal as it begins; its words stand in the file said<name>.
+int ended_by(int signal, const test::TempFolder& folder, const std::string& name) {
+  const std::string file = folder / ("r" + name), said = folder / ("said" + name);
+  const pid_t child = fork();
+  REQUIRE(child >= 0);
+  if (child == 0) {
+    (void)!freopen(said.c_str(), "w", stdout);
+    (void)!freopen("/dev/null", "w", stderr);
+    execl(TPM_TEST_PROGRAM, "tpm", "hil", "run", (folder / "session.json").c_str(), "--clock",
+          "real", "-o", file.c_str(), static_cast<char*>(nullptr));
+    _exit(127);
+  }
+  for (int wait = 0; wait < 12'000 && !std::filesystem::exists(file); ++wait) {
+    std::this_thread::sleep_for(std::chrono::milliseconds(5));
+  }
+  (void)kill(child, signal);
+  int status = 0;
+  (void)waitpid(child, &status, 0);
+  return status;
+}
+
+}  // namespace
+
 TEST_CASE("Every signal that ends a process lets a session say how it ended, as SIGTERM does") {
   const test::TempFolder folder;
   Json session = test::short_session();
@@ -85,27 +110,18 @@ TEST_CASE("Every signal that ends a process lets a session say how it ended, as 
   session["limits"] = {{"cycle_timeout", "1 s"}, {"late_cycles", 1000}};
   write_file(folder / "session.json", session.dump());
   for (const int signal : {SIGTERM, SIGUSR1, SIGALRM, SIGIO, SIGPWR, SIGRTMIN}) {
-    const std::string name = std::to_string(signal), file = folder / ("r" + name);
-    const std::string said = folder / ("said" + name);
-    const pid_t child = fork();
-    REQUIRE(child >= 0);
-    if (child == 0) {
-      (void)!freopen(said.c_str(), "w", stdout);
-      (void)!freopen("/dev/null", "w", stderr);
-      execl(TPM_TEST_PROGRAM, "tpm", "hil", "run", (folder / "session.json").c_str(), "--clock",
-            "real", "-o", file.c_str(), static_cast<char*>(nullptr));
-      _exit(127);
-    }
-    for (int wait = 0; wait < 4000 && !std::filesystem::exists(file); ++wait) {
-      std::this_thread::sleep_for(std::chrono::milliseconds(5));
-    }
-    (void)kill(child, signal);
+    // A machine that stalls for a second ends a session before its signal does.
+    constexpr int kMostTries = 5;
+    std::string words = "end: cycle timeout";
     int status = 0;
-    (void)waitpid(child, &status, 0);
-    CAPTURE(signal, status);
+    for (int i = 0; i < kMostTries && words.find("end: cycle timeout") != std::string::npos; ++i) {
+      const std::string name = std::to_string(signal) + "_" + std::to_string(i);
+      status = ended_by(signal, folder, name);
+      words = read_file(folder / ("said" + name));
+    }
+    CAPTURE(signal, status, words);
     REQUIRE(WIFEXITED(status));
     CHECK(WEXITSTATUS(status) == 128 + signal);
-    const std::string words = read_file(said);
     CHECK(words.find("end: signal") != std::string::npos);
     CHECK(words.find("wrote ") != std::string::npos);
   }

@@ -19,7 +19,7 @@ struct HangSeen {
   std::atomic<bool> hanging{false}, cut_while_hanging{false};
 };
 
-/// A free handle one of whose reads hangs until forces are cut, or for 0.4 s.
+/// A free handle one of whose reads hangs until forces are cut, or for 20 s.
 class HangingHandle final : public VirtualOmega7 {
  public:
   HangingHandle(const PlantSettings& plant, std::shared_ptr<HangSeen> seen)
@@ -30,7 +30,8 @@ class HangingHandle final : public VirtualOmega7 {
     constexpr int kHangsAt = 500;
     if (++seen_->reads == kHangsAt) {
       seen_->hanging = true;
-      for (int i = 0; i < 400 && !seen_->cut_while_hanging; ++i) std::this_thread::sleep_for(1ms);
+      for (int i = 0; i < 20'000 && !seen_->cut_while_hanging; ++i)
+        std::this_thread::sleep_for(1ms);
       seen_->hanging = false;
     }
     return VirtualOmega7::read(position_m);

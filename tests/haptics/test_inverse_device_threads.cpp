@@ -419,7 +419,7 @@ TEST_CASE(
   (void)device.open();
   DevicePreparation preparation;
   preparation.real_time = true;
-  preparation.watchdog_s = 1.0;  // the machine may stall
+  preparation.watchdog_s = 4.0;  // the machine may stall
   device.prepare(preparation);
   device.enable_forces();
   const auto until = [&](const std::function<bool()>& met) {
@@ -447,7 +447,7 @@ TEST_CASE("Forces that are cut from another thread are zero at the service befor
   preparation.watchdog_s = 10.0;
   device.prepare(preparation);
   device.enable_forces();
-  for (int i = 0; i < 2000 && service.last_N().z() != 2.0; ++i) {
+  for (int i = 0; i < 20'000 && service.last_N().z() != 2.0; ++i) {
     (void)device.write({0.0, 0.0, 2.0});
     std::this_thread::sleep_for(1ms);
   }
@@ -470,7 +470,7 @@ TEST_CASE("Answers that are dropped now and then end nothing") {
   (void)device.open();
   DevicePreparation preparation;
   preparation.real_time = true;
-  preparation.watchdog_s = 2.0;
+  preparation.watchdog_s = 10.0;
   device.prepare(preparation);
   device.enable_forces();
   Eigen::Vector3d at_m;

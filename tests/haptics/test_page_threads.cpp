@@ -274,6 +274,7 @@ TEST_CASE("A session on the clock is served while it runs, to friends and others
   json["limits"] = {{"watchdog", "16 ms"}, {"cycle_timeout", "1 s"}, {"late_cycles", 1000}};
   HilSession session = test::parsed(json);
   session.servo.most_missed = 1'000'000;
+  session.cycle_timeout_s = 10.0;
   LiveView view(session, true);
   PageServer server(view, 0);
   std::atomic<bool> over{false};

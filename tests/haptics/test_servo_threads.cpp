@@ -33,7 +33,7 @@ HilSession patient_session() {
   HilSession session = test::parsed(test::short_session());
   session.servo.most_late = 1001;
   session.servo.most_missed = 1'000'000;
-  session.cycle_timeout_s = 1.0;
+  session.cycle_timeout_s = 10.0;
   return session;
 }
 
@@ -61,7 +61,7 @@ TEST_CASE("On the clock a session takes its time, and every cycle is recorded or
   HilSession session = test::parsed(json);
   session.servo.most_late = 1001;
   session.servo.most_missed = 1'000'000;
-  session.cycle_timeout_s = 1.0;
+  session.cycle_timeout_s = 10.0;
   session.plant.watchdog_s = session.preparation.watchdog_s = 0.016;
   const auto start = std::chrono::steady_clock::now();
   const SessionRun run = run_session(session, {}, on_the_clock(folder / "r"));
@@ -156,12 +156,15 @@ TEST_CASE("A call that hangs: forces are off before it ends, the cause is told")
   if (!seen) WARN("the machine stalled before the call did, 10 times");
 }
 
-/// A session on the stand-in, interrupted soon.
-SessionRun short_run_on_stand_in(const test::TempFolder& folder,
+/// A session on the stand-in, interrupted 0.3 s after it began to read, however late that is.
+SessionRun short_run_on_stand_in(const test::TempFolder& folder, const test::VendorScript& script,
                                  std::atomic<int>* cycles = nullptr) {
   SessionRunOptions options = on_the_clock(folder / "r");
-  const auto start = std::chrono::steady_clock::now();
-  options.interrupted = [start] { return std::chrono::steady_clock::now() - start > 300ms; };
+  options.interrupted = [&script, after = std::chrono::steady_clock::time_point::max()]() mutable {
+    const auto now = std::chrono::steady_clock::now();
+    if (script.event_ns("thread_of_first_read") > 0) after = std::min(after, now + 300ms);
+    return now > after;
+  };
   if (cycles != nullptr) {
     options.watcher = [cycles](const ServoRecord& row) {
       if (row.stop == StopCause::none) ++*cycles;
@@ -174,7 +177,7 @@ TEST_CASE(
     "The device is prepared when all threads are there, and the loop's thread enables forces") {
   const test::TempFolder folder;
   const test::VendorScript script(hand_in_place(folder) + "watchdog_by_clock 0\n");
-  (void)short_run_on_stand_in(folder);
+  (void)short_run_on_stand_in(folder, script);
   // The caller's, the loop's and that of the records.
   CHECK(script.event_ns("threads_when_prepared") >= 3);
   CHECK(script.event_ns("thread_of_forces_on") > 0);
@@ -190,7 +193,7 @@ TEST_CASE("A device whose watchdog counts by the clock lets a session begin") {
     const test::TempFolder folder;
     const test::VendorScript script(hand_in_place(folder));
     cycles = 0;
-    (void)short_run_on_stand_in(folder, &cycles);
+    (void)short_run_on_stand_in(folder, script, &cycles);
   }
   CHECK(cycles >= kSome);
 }
@@ -218,11 +221,14 @@ TEST_CASE(
   const test::TempFolder folder;
   const test::VendorScript script(hand_in_place(folder) +
                                   "watchdog_by_clock 0\nfault hang 350 30\n");
-  HilSession session = patient_session();
-  session.cycle_timeout_s = 1.0;
+  const HilSession session = patient_session();
   SessionRunOptions options = on_the_clock(folder / "r");
-  const auto start = std::chrono::steady_clock::now();
-  options.interrupted = [start] { return std::chrono::steady_clock::now() - start > 1500ms; };
+  // Half a second after the call hung; or when the session is over.
+  options.interrupted = [&, after = std::chrono::steady_clock::time_point::max()]() mutable {
+    const auto now = std::chrono::steady_clock::now();
+    if (script.event_ns("hang_over") > 0) after = std::min(after, now + 500ms);
+    return now > after;
+  };
   (void)run_session(session, test::stand_in_choice(), options);
   const HilRecording recording = read_recording(folder / "r");
   const double period_s = session.servo.period_s;

@@ -198,9 +198,9 @@ def faults_of_next(line, usage, program, folder):
         path = f"{program.parent}:{os.environ['PATH']}"
         try:
             done = subprocess.run(["sh", "-c", line], cwd=there, env=dict(os.environ, PATH=path), capture_output=True,
-                                  text=True, timeout=300)
+                                  text=True, timeout=1200)
         except subprocess.TimeoutExpired:
-            return [f"next: {line}: has not ended after 300 s"]
+            return [f"next: {line}: has not ended after 1200 s"]
     return [f"next: {line}: ends with {done.returncode}: {done.stderr.strip()}"] if done.returncode > 1 else []
 
 
@@ -234,7 +234,7 @@ def main():
         (folder / "session.json").write_text(json.dumps(SESSION))
         for line in RUNS.strip().splitlines():
             words = [w.replace("CONFIGS", str(root / "configs")) for w in shlex.split(line)]
-            done = subprocess.run([program, *words, "--format", "json"], cwd=folder, capture_output=True, text=True, timeout=300)
+            done = subprocess.run([program, *words, "--format", "json"], cwd=folder, capture_output=True, text=True, timeout=1200)
             if done.returncode > 1:
                 faults += 1
                 print(f"tpm {line}: exit code {done.returncode}: {done.stderr.strip()}")
@@ -250,7 +250,7 @@ def main():
                 shutil.copy(folder / "recording.csv", folder / "my recording.csv")
             wrong = faults_of(answer, words, folder, done.returncode)
             if line.startswith(QUICK) and not line.startswith(UNENDED):
-                done = subprocess.run([program, *words], cwd=folder, capture_output=True, text=True, timeout=300)
+                done = subprocess.run([program, *words], cwd=folder, capture_output=True, text=True, timeout=1200)
                 wrong += faults_of_end(answer, done.stdout)
             elif not line.startswith(UNENDED) and not {"files", "next"} <= answer.keys():
                 wrong.append("files or next are missing")

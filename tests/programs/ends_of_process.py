@@ -78,22 +78,26 @@ def events_of(log):
 def ended(command, environment, log, send, switched_on):
     """Exit code, events after the end began, last words of tpm. `switched_on`: how often forces go on until then.
 
-    None where the program ended before: on a machine that stalls, the check of a second refuses the session."""
+    None where the program ended before: on a machine that stalls, the check of a second refuses the session, or the session
+    itself ends."""
     log.unlink(missing_ok=True)
     # Signals that stop a process do so in a group that somebody looks after: its parent, from another one.
     process = subprocess.Popen(command, env=environment, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE,
                                text=True, stdin=subprocess.DEVNULL,
                                preexec_fn=os.setpgrp if send in STOPS else None)
-    until = time.monotonic() + 60
+    until = time.monotonic() + 300
     while (events_of(log).count("thread_of_forces_on") < switched_on and process.poll() is None
            and time.monotonic() < until):
         time.sleep(0.01)
     if events_of(log).count("thread_of_forces_on") < switched_on:
-        process.communicate(timeout=60)
+        process.communicate(timeout=600)
         return None
     before = len(events_of(log))
     if send is not None:
         time.sleep(0.3)
+        if set(events_of(log)[before:]) & set(OFF):  # a stall ended it before
+            process.communicate(timeout=600)
+            return None
         before = len(events_of(log))
         process.send_signal(send)
         if send in (signal.SIGPIPE, signal.SIGXFSZ):
@@ -107,7 +111,7 @@ def ended(command, environment, log, send, switched_on):
         os.waitid(os.P_PID, process.pid, os.WSTOPPED | os.WEXITED | os.WNOWAIT)
         events = events_of(log)[before:]  # while it is stopped
         process.send_signal(signal.SIGCONT)
-    words = process.communicate(timeout=60)[1].strip().splitlines()
+    words = process.communicate(timeout=600)[1].strip().splitlines()
     code = process.returncode
     events = [e for e in (events_of(log)[before:] if events is None else events) if e in OFF + ("close",)]
     return 128 - code if code < 0 else code, events, words[-1] if words else "-"

@@ -49,7 +49,7 @@ READ_SESSION = ("tpm hil verify", "tpm hil report", "tpm hil export")  # others 
 BEFORE = {"tpm hil run configs/hil_omega7.json --device omega7 --device-file device.json":
           "tpm hil identify --device virtual --duration '5 s' -o device.json && sed -i 's/\"virtual\"/\"omega7\"/' device.json",
           "tpm sweep show sweep.h5": "tpm sweep configs/sweep_x_depth_100.json -o sweep.h5"}
-WALL_S = 300  # a process that waits for ever ends then, which is a fault
+WALL_S = 1200  # a process that waits for ever ends then, which is a fault
 
 
 def examples(program):

@@ -128,7 +128,7 @@ def main():
         for line in lines:
             gone = re.search(r"gone\.\w+", line)[0]
             done = subprocess.run([tpm, *line.split()], cwd=folder, stdin=subprocess.DEVNULL, stdout=subprocess.PIPE,
-                                  stderr=subprocess.PIPE, text=True, timeout=120)
+                                  stderr=subprocess.PIPE, text=True, timeout=600)
             if (done.returncode, done.stdout) != (3, "") or done.stderr != f"tpm: {gone}: no such file; expected a readable file\n":
                 wrong.append(f"tpm {line}\n    exit code {done.returncode}: {(done.stdout + done.stderr).strip()[-300:]}")
             for path in folder.glob("out*"):

@@ -83,7 +83,7 @@ def call(tpm, root, typed, out, folder, prefix=()):
         done = [sys.executable, str(root / words[0].lower()), *[w.replace("OUT", out) for w in words[1:]]]
     else:
         done = [str(tpm), *[w.replace("OUT", out) for w in words]]
-    return subprocess.run([*prefix, *done], cwd=folder, capture_output=True, text=True, check=False, timeout=300,
+    return subprocess.run([*prefix, *done], cwd=folder, capture_output=True, text=True, check=False, timeout=1200,
                           env={**os.environ, "MPLBACKEND": "Agg", "PYTHONDONTWRITEBYTECODE": "1"})
 
 

@@ -100,7 +100,7 @@ def faults_of(root, name, program):
         for command, shown in calls:
             if re.search(r"# not run: \S", command):
                 continue
-            run = subprocess.run(command, shell=True, cwd=folder, capture_output=True, text=True, check=False, timeout=300,
+            run = subprocess.run(command, shell=True, cwd=folder, capture_output=True, text=True, check=False, timeout=1200,
                                  env={**os.environ, "PATH": path, "MPLBACKEND": "Agg"})
             lines = [line for line in (run.stdout + run.stderr).splitlines() if line.strip()]  # as calls_of()
             printed += lines

@@ -91,11 +91,11 @@ def chromium_or_skip(folder):
 def loaded(chromium, page):
     chromium.call("Page.navigate", url=page.as_uri())
     want = f"document.readyState === 'complete' && location.pathname === {urllib.parse.quote(str(page))!r}"
-    chromium.awaited(want, 30, f"{page} does not load")
+    chromium.awaited(want, 240, f"{page} does not load")
 
 
 def unset_formulas(chromium, page):
-    """What MathJax could not set, or did not within a minute; formulas are set after a page has loaded."""
+    """What MathJax could not set, or did not within four minutes; formulas are set after a page has loaded."""
     start = time.monotonic()
     count = """[document.querySelectorAll('.math').length, document.querySelectorAll('script[type^="math/tex"]').length,
                 document.querySelectorAll('.MathJax_SVG').length, window.MathJax && MathJax.Hub ? MathJax.Hub.getAllJax().filter(f => f.texError).length : 0]"""
@@ -103,7 +103,7 @@ def unset_formulas(chromium, page):
         marked, read, drawn, wrong = chromium.call("Runtime.evaluate", returnByValue=True, expression=count)["result"]["value"]
         if marked <= read == drawn:
             return f"{wrong} of {read} formulas are wrong" if wrong else ""
-        if time.monotonic() - start > 60:
+        if time.monotonic() - start > 240:
             return f"{drawn} of {marked} formulas are set"
         time.sleep(0.05)
 
@@ -143,7 +143,7 @@ def check_search(folder, chromium):
         [...document.querySelectorAll('#search-results li > a')].slice(0, {FIRST}).map(a => a.getAttribute('href')))"""
     for words, wanted in SEARCHES.items():
         chromium.call("Page.navigate", url=f"{(folder / 'search.html').as_uri()}?q={urllib.parse.quote_plus(words)}")
-        chromium.awaited(listed.replace("WANTED", wanted), 30, f"the search for '{words}' does not find {wanted}.html")
+        chromium.awaited(listed.replace("WANTED", wanted), 240, f"the search for '{words}' does not find {wanted}.html")
     print(f"{len(SEARCHES)} questions find their page among the first {FIRST} results")
 
 

@@ -40,7 +40,7 @@ class Page:
         self.seconds = time.monotonic() - start
 
     def ready(self, what):
-        self.chromium.awaited("document.body && document.body.dataset.ready == 'yes'", 60, f"{what} does not get ready")
+        self.chromium.awaited("document.body && document.body.dataset.ready == 'yes'", 240, f"{what} does not get ready")
 
     def js(self, expression):
         answer = self.chromium.call("Runtime.evaluate", expression=expression, returnByValue=True)
@@ -407,6 +407,45 @@ def look_at_lines(chromium, tpm, folder):
     page.check_whole()
 
 
+def look_at_long_words(chromium, tpm, folder):
+    """Names of files, titles and labels as long as a user can make them, with and without places to break, in figures, in a
+    law and in a list of results: the page fits, what is drawn stays on its canvas, and what is cut there can be read."""
+    there = folder / "long"
+    there.mkdir()
+    for number, long in enumerate(("specimen_17_of_the_second_series_under_the_instrument_" * 4, "specimen 17 of the second series " * 7)):
+        by_name = {"x": {"quantity": "", "unit": "", "names": [long + "a", long + "b", "short"]}, "y": {"quantity": long, "unit": "N"}}
+        across = {"x": {"quantity": long, "unit": "mm"}, "y": {"quantity": "recording", "unit": "", "names": [long + "a", long + "b"]}}
+        panels = [{**by_name, "series": [{"kind": "points", "label": long, "x": [1, 2, 3], "y": [1.0, 2.0, 3.0]}]},
+                  {**across, "series": [{"kind": "points", "label": long, "x": [1.0, 2.0], "y": [1, 2]},
+                                        {"kind": "line", "label": "b", "x": [0.0, 3.0], "y": [1, 2]}]}]
+        figures = {"figures": [{"name": "long", "title": long, "caption": long, "note": long, "panels": panels}]}
+        file = there / f"{long[:200]}{number}.json"
+        file.write_text(json.dumps(figures))
+        subprocess.run([tpm, "view", file, "-o", folder / f"long{number}.html"], check=True, capture_output=True)
+        page = Page(chromium, folder / f"long{number}.html")
+        for width in (400, 1400):
+            chromium.call("Emulation.setDeviceMetricsOverride", width=width, height=900, deviceScaleFactor=1, mobile=False)
+            page.frame()
+            outside = page.js("""(() => {
+                const out = [];
+                for (const p of plots) {
+                  const g = p.canvas.getContext('2d'), write = g.fillText;
+                  g.fillText = (text, x, y) => { const w = g.measureText(text).width, a = g.textAlign, left = a === 'center' ? x - w / 2 : a === 'right' ? x - w : x;
+                    if (left < -1 || left + w > p.width + 1) out.push([text, left, left + w]); write.call(g, text, x, y); };
+                  p.draw(); delete g.fillText;
+                }
+                for (const e of document.querySelectorAll('h1, h2, p, td, th, .badge, select')) {
+                  const r = e.getBoundingClientRect();
+                  if (r.width > 0 && (r.left < 0 || r.right > innerWidth)) out.push([e.tagName, r.left, r.right]);
+                }
+                return out; })()""")
+            assert not outside, (width, outside)
+            assert page.js(f"plots.every(p => p.canvas.title.includes({json.dumps(long)}))"), page.js("plots.map(p => p.canvas.title)")
+        page.check_whole()
+    subprocess.run([tpm, "view", there, "-o", folder / "long.html"], check=True, capture_output=True)
+    Page(chromium, folder / "long.html").check_whole()
+
+
 def look_at_folder(chromium, tpm, folder):
     """Several results on one page: a list names them, each is shown when its name is clicked; a sweep, which is not
     shown, is named with the command that draws it, on the page, in the text and in the JSON."""
@@ -512,6 +551,7 @@ def main():
             look_at_fit(chromium, sys.argv[1], folder)
             look_at_names(chromium, sys.argv[1], folder)
             look_at_lines(chromium, sys.argv[1], folder)
+            look_at_long_words(chromium, sys.argv[1], folder)
             look_at_folder(chromium, sys.argv[1], folder)
             look_at_study(chromium, sys.argv[1], folder, sys.argv[2] if len(sys.argv) > 2 else None)
         finally:

@@ -17,7 +17,7 @@ constexpr std::string_view kStyle = R"css(
 :root { --ink: #1d2329; --soft: #57606a; --rule: #d8dee4; --tint: #f6f8fa; --link: #0059a6; }
 * { box-sizing: border-box; }
 body { margin: 0 auto; padding: 1.5rem 1rem 4rem; max-width: 60rem; color: var(--ink);
-       background: #fff; font: 1rem/1.55 system-ui, "Segoe UI", "DejaVu Sans", sans-serif; }
+       background: #fff; font: 1rem/1.55 system-ui, "Segoe UI", "DejaVu Sans", sans-serif; overflow-wrap: break-word; }
 h1 { font-size: 1.7rem; line-height: 1.25; margin: 0 0 .3rem; }
 h2 { font-size: 1.3rem; margin: 2.6rem 0 .6rem; padding-top: .8rem; border-top: 1px solid var(--rule); }
 h3 { font-size: 1.05rem; margin: 1.8rem 0 .4rem; }
@@ -27,7 +27,7 @@ a { color: var(--link); }
 code { font: .9em/1.4 "DejaVu Sans Mono", ui-monospace, monospace; background: var(--tint); padding: 0 .25em; }
 .subtitle { color: var(--soft); }
 nav { margin: 1rem 0; padding: .6rem 1rem; background: var(--tint); border-radius: .4rem; }
-nav a { display: inline-block; margin-right: 1.1rem; }
+nav a { display: inline-block; margin-right: 1.1rem; max-width: 100%; }
 .wide { overflow-x: auto; margin: .8rem 0 1.2rem; }
 table { border-collapse: collapse; font-size: .9rem; }
 caption { text-align: left; color: var(--soft); padding-bottom: .35rem; }
