@@ -41,7 +41,7 @@ void add_hil_stability_command(CLI::App& hil, Session& session) {
       files = write_figures(options->folder, boundary_figures(study));
       write_file(folder / "boundaries.json", to_text(json));
       files.insert(files.begin(), "boundaries.json");
-      next = "tpm view " + shell_word((folder / "figures.json").string());
+      next = next_of_pictures(folder);
     }
     add_end(json, folder, files, next);
     if (session.json()) {

@@ -73,11 +73,6 @@ std::pair<std::string, std::uint64_t> parse_fixed(const std::string& text,
   return {name, static_cast<std::uint64_t>(nearest - axis.places.begin())};
 }
 
-/// The page of figures that were drawn into a folder.
-std::string next_of_pictures(const std::string& folder) {
-  return "tpm view " + shell_word((fs::path(folder) / "figures.json").string());
-}
-
 /// Prints an answer; pictures beside it, if a folder was named, else the command that draws them.
 /// @param all results with `short_answer`
 /// @param text everything, for --verbose
