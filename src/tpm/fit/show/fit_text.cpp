@@ -158,7 +158,10 @@ std::string to_terminal_text(const FitResult& result) {
                       result.band_count > 0 ? fmt::format(" and {} bands", result.band_count) : "",
                       result.degrees_of_freedom > 0 ? std::to_string(result.degrees_of_freedom)
                                                     : std::string("no"));
-  if (result.chi_square_p) text += fmt::format(", p = {}", significant(*result.chi_square_p, 2));
+  if (result.chi_square_p) {
+    text += fmt::format(", p = {}{}", significant(*result.chi_square_p, 2),
+                        result.recordings.empty() ? "" : " if all samples were independent");
+  }
   text += "\n" + noise_line(result);
   if (result.likelihood) text += likelihood_line(*result.likelihood);
   text += "\n";
