@@ -38,9 +38,8 @@ td.number, th.number { text-align: right; font-variant-numeric: tabular-nums; wh
 .good { color: #0b5d2a; } td.good { background: #e9f6ec; }
 .fair { color: #6b4a00; } td.fair { background: #fdf3dc; }
 .bad { color: #93200f; } td.bad { background: #fdebe7; }
-figure { margin: 1.2rem 0 1.8rem; overflow-x: auto; }
-figure svg { display: block; max-width: none; }
-@media (min-width: 58rem) { figure svg { max-width: 100%; height: auto; } }
+figure { margin: 1.2rem 0 1.8rem; }
+figure svg { display: block; max-width: 100%; height: auto; }
 figcaption { color: var(--soft); font-size: .92rem; max-width: 46rem; }
 figcaption b { color: var(--ink); }
 @media print {
@@ -48,8 +47,7 @@ figcaption b { color: var(--ink); }
   nav { display: none; }
   h2 { break-after: avoid; } h3 { break-after: avoid; }
   figure, tr { break-inside: avoid; }
-  .wide, figure { overflow: visible; }
-  figure svg { max-width: 100%; height: auto; }
+  .wide { overflow: visible; }
 }
 )css";
 
