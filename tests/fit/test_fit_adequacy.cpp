@@ -333,7 +333,7 @@ TEST_CASE("a stated size of the noise is what residuals are compared with", "[ad
   const LawAdequacy wrong = verdict(test::kNoise_N / 3.0);
   CHECK(wrong.is_rejected());
   CHECK_THAT(wrong.summary,
-             Contains("times the noise that is stated (p = ") && Contains(", below 1 %)"));
+             Contains("times the noise that is stated, p = ") && Contains(" is below 1 %"));
   CHECK(wrong.residual_over_noise.value() == Approx(3.0).epsilon(0.15));
 }
 
@@ -349,7 +349,7 @@ TEST_CASE(
     const double p = fit.chi_square_p.value();
     CHECK((p >= 0.01) == adequate);
     CHECK(fit.adequacy.value().is_adequate() == adequate);
-    CHECK_THAT(fit.adequacy->summary, Contains("(p = " + base::significant(p, 2) + ", "));
+    CHECK_THAT(fit.adequacy->summary, Contains(", p = " + base::significant(p, 2) + " is "));
     CHECK(fit.parameters.front().only_if_described == !adequate);
   }
 }

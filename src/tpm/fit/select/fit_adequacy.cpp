@@ -237,7 +237,7 @@ std::string times_the_noise(const Judged& judged) {
   const Adequacy& a = judged.adequacy;
   const std::string times = "residual " + times_text(a.residual_over_noise) + " times the noise ";
   if (!judged.noise_was_stated) return times + (a.noise_under_load ? "under load" : "at rest");
-  return fmt::format("{}that is stated (p = {}, {} {} %)", times, significant(a.p_value, 2),
+  return fmt::format("{}that is stated, p = {} is {} {} %", times, significant(a.p_value, 2),
                      a.p_value < kLevel ? "below" : "not below", 100.0 * kLevel);
 }
 
