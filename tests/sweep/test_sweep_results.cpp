@@ -172,8 +172,10 @@ TEST_CASE("sensitivity of a sum: each term's share of the variance") {
   CHECK(sensitivity_text({sum, peak}).find("E2") != std::string::npos);
   const ShortAnswer answer = short_answer(std::vector{sum, peak}, "title");
   REQUIRE(answer.rows.size() == 2);  // of each number the parameters, the decisive one first
-  CHECK_THAT(answer.rows[0], Catch::StartsWith("sum: E2 0.8"));
-  CHECK_THAT(answer.rows[1], Catch::StartsWith("peak_force: E2 1.00") && Catch::Contains(" N"));
+  CHECK_THAT(answer.rows[0],
+             Catch::StartsWith("sum at depth = 8 mm") && Catch::Contains(" E2 0.8"));
+  CHECK_THAT(answer.rows[1], Catch::StartsWith("peak_force") && Catch::Contains(" N ") &&
+                                 Catch::Contains(" E2 1.00"));
   const auto figures = sensitivity_figures({sum, peak}, "title");
   CHECK_FALSE(to_text(to_json(figures)).empty());
   CHECK(figures[1].title == "peak force");

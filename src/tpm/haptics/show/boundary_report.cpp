@@ -8,6 +8,7 @@
 #include <limits>
 
 #include "tpm/base/enum_names.hpp"
+#include "tpm/base/sized_unit.hpp"
 #include "tpm/base/text.hpp"
 #include "tpm/show/result_table.hpp"
 
@@ -348,26 +349,27 @@ ShortAnswer short_answer(const BoundaryStudy& study) {
   answer.head = {fmt::format("at {} Hz with {} N s/m of friction, relaxation time {} ms:",
                              significant(kShownRate_Hz, 4), significant(friction, 3),
                              significant(1e3 * study.relaxation_time_s, 3)),
-                 fmt::format("{:>6} {:>13} {:>12}", "delay", "passive", "stable")};
+                 fmt::format("{:>6} {:>13} {:>13}", "delay", "passive", "stable")};
   for (const BoundaryPoint& p : study.passive) {
     if (p.rate_Hz != kShownRate_Hz || p.damping_N_s_per_m != friction) continue;
     const auto stable = std::ranges::find_if(study.stable, [&](const BoundaryPoint& s) {
       return s.rate_Hz == p.rate_Hz && s.delay_periods == p.delay_periods;
     });
+    const auto words = [](double v) {
+      return std::isfinite(v) ? sized_text(Dimension::stiffness, v, 4) : value(v);
+    };
     answer.rows.push_back(fmt::format(
-        "{:>3} ms {:>9} N/m {:>8} N/m", significant(1e3 * p.delay_periods / p.rate_Hz, 3),
-        value(p.measured), stable == study.stable.end() ? "-" : value(stable->measured)));
+        "{:>6} {:>13} {:>13}", significant(1e3 * p.delay_periods / p.rate_Hz, 3) + " ms",
+        words(p.measured), stable == study.stable.end() ? "-" : words(stable->measured)));
   }
   answer.limits.push_back(rest_sentence(study));
   for (std::size_t i = 0; i < study.shortest.size(); ++i) {
     const BoundaryPoint& euler = study.shortest[i];
     if (euler.rate_Hz != kShownRate_Hz) continue;
-    answer.limits.push_back(
-        fmt::format("forward Euler needs a relaxation time above {} ms, the exact update {}",
-                    value(1e3 * euler.measured),
-                    study.shortest_exact[i].measured == 0.0
-                        ? std::string("none")
-                        : value(1e3 * study.shortest_exact[i].measured) + " ms"));
+    const double exact = study.shortest_exact[i].measured;
+    answer.limits.push_back(fmt::format(
+        "forward Euler is passive at relaxation times above {} ms, the exact update at {}",
+        value(1e3 * euler.measured), exact == 0.0 ? "all" : value(1e3 * exact) + " ms and more"));
   }
   for (const DeviceCorner& corner : study.corners) {
     if (!corner.assumed_friction_N_s_per_m) continue;

@@ -9,6 +9,7 @@
 #include "tpm/base/lists.hpp"
 #include "tpm/base/sized_unit.hpp"
 #include "tpm/base/text.hpp"
+#include "tpm/show/table_document.hpp"
 #include "tpm/sweep/show/sweep_report.hpp"
 
 namespace tpm::sweep {
@@ -55,7 +56,7 @@ std::string decisive_words(const SweepSensitivity& s, std::size_t most) {
                        total.high);
   });
   const std::size_t more = s.indices.inputs.size() - shown;
-  return more == 0 ? words : fmt::format("{}, {} more below", words, more);
+  return more == 0 ? words : fmt::format("{}; {} less", words, more);
 }
 
 }  // namespace
@@ -64,24 +65,24 @@ ShortAnswer short_answer(const std::vector<SweepSensitivity>& all, const std::st
   constexpr std::size_t kShownParameters = 3;
   ShortAnswer answer;
   if (!title.empty()) answer.conclusion.push_back(title);
+  answer.conclusion.emplace_back(
+      "total Sobol index: the share of the variance that is left when all other parameters are "
+      "known");
+  std::vector<std::vector<std::string>> table{{"", "mean", "std. dev.", "total index (95 %)"}};
   for (const SweepSensitivity& s : all) {
-    if (answer.head.empty()) {
-      answer.conclusion.push_back(fmt::format(
-          "total Sobol indices (95 % intervals): the share of the variance that is left when all "
-          "other parameters are known{}",
-          fixed_words(s.fixed, 4)));
-      answer.head = {
-          fmt::format("{} replicates of {} points:", s.design.replicates, s.design.points)};
-    }
-    answer.rows.push_back(fmt::format(
-        "{}: {}", s.variable,
-        s.indices.inputs.empty() ? std::string("does not vary")
-                                 : decisive_words(s, kShownParameters) + "; " + spread_words(s)));
+    const Unit unit = sized_unit(shown_unit_of(s.unit), s.indices.mean);
+    table.push_back(
+        {s.variable + fixed_words(s.fixed, 4), value_words(s.indices.mean, unit, 4),
+         value_words(s.indices.standard_deviation, unit, 4),
+         s.indices.inputs.empty() ? "does not vary" : decisive_words(s, kShownParameters)});
     if (s.indices.left_out > 0) {
       answer.warnings.push_back(fmt::format("{}: {} points without a number are left out",
                                             s.variable, s.indices.left_out));
     }
   }
+  answer.rows = separate_lines(aligned(table));
+  answer.head = {answer.rows.front()};
+  answer.rows.erase(answer.rows.begin());
   return answer;
 }
 
