@@ -63,7 +63,7 @@ constexpr std::string_view kStackingStyle =
   table.stacks td { display: flex; justify-content: space-between; gap: 1rem; border: 0; padding: .1rem .3rem;
                     overflow-wrap: anywhere; }
   table.stacks td.long { min-width: 0; }
-  table.stacks td::before { content: attr(data-title); color: var(--soft); }
+  table.stacks td::before { content: attr(data-title); color: var(--soft); flex: none; max-width: 45%; }
 }
 )css";
 
