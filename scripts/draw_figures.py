@@ -372,9 +372,9 @@ def lettered(letter, title):
 
 
 def keep_inside(page, axes, least):
-    """Narrows a panel whose tick labels are so wide that the title of its axis would stand left of `least` (inches)."""
-    box = axes.yaxis.get_tightbbox(page.canvas.get_renderer())
-    missing = least - box.x0 / page.dpi
+    """Narrows a panel whose labels, of ticks or of names aslant, would begin left of `least` (inches)."""
+    boxes = [axis.get_tightbbox(page.canvas.get_renderer()) for axis in (axes.xaxis, axes.yaxis)]
+    missing = least - min(box.x0 for box in boxes) / page.dpi
     if missing <= 0:
         return
     place, share = axes.get_position(), missing / page.get_figwidth()
