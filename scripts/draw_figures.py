@@ -28,13 +28,14 @@ from matplotlib.patheffects import withStroke  # noqa: E402
 from matplotlib.ticker import FixedLocator, FuncFormatter, MaxNLocator, NullLocator  # noqa: E402
 
 # Lengths in inches, so that text keeps its size whatever the number of panels. Widths of journals: two columns
-# (180 mm), and one and a half (130 mm) for one panel. At 400 pixels the text of the wider is still 7 pixels high.
+# (180 mm) in print, and one and a half (130 mm) for one panel and on screens, where panels stand one below the other:
+# on a page of 400 pixels the text is then 9 pixels high.
 PAGE_WIDTH, SINGLE_PAGE_WIDTH, PANEL_HEIGHT = 180 / 25.4, 130 / 25.4, 2.5
 LEFT, RIGHT, TOP, GAP, BELOW_AXIS = 0.66, 0.12, 0.32, 0.72, 0.52
 EDGE = 0.06  # between the title of an axis and what stands left of it
 LEGEND_ROW, NOTE_ROW, TITLE_ROW = 0.178, 0.165, 0.17
 HANDLE = 0.45  # of a legend's text, and the gap before the next
-MOST_ACROSS = 2  # panels; more go on below
+ACROSS_IN_PRINT = 2  # panels; more go on below
 TITLE_SIZE, LEGEND_SIZE, NOTE_SIZE = 9.5, 8.5, 7.5  # points
 
 # After Okabe and Ito, whose colours people with any of the usual deficiencies tell apart; darkened to a contrast of
@@ -371,9 +372,9 @@ def lettered(letter, title):
 
 
 def keep_inside(page, axes, least):
-    """Narrows a panel whose tick labels are so wide that the title of its axis would stand left of `least` (inches)."""
-    box = axes.yaxis.get_tightbbox(page.canvas.get_renderer())
-    missing = least - box.x0 / page.dpi
+    """Narrows a panel whose labels, of ticks or of names aslant, would begin left of `least` (inches)."""
+    boxes = [axis.get_tightbbox(page.canvas.get_renderer()) for axis in (axes.xaxis, axes.yaxis)]
+    missing = least - min(box.x0 for box in boxes) / page.dpi
     if missing <= 0:
         return
     place, share = axes.get_position(), missing / page.get_figwidth()
@@ -387,20 +388,20 @@ def below_names(panels, width):
     return max(0.0, 0.045 * longest + 0.10 - BELOW_AXIS)
 
 
-def draw_figure(figure):
-    """The figure, laid out from the bottom: provenance, legend, panels."""
+def draw_figure(figure, most_across=1):
+    """The figure, laid out from the bottom: provenance, legend, panels, so many beside each other."""
     if any(s["kind"] == "trail" for panel in figure["panels"] for s in panel["series"]):
         import work_precision  # beside this file; other figures do without
         return work_precision.draw_figure(figure, axis_label, lambda i, n, title: lettered(letter_of(i, n), title))
     panels, look = figure["panels"], looks(figure)
     labels = list(dict.fromkeys(legend_text(s) for panel in panels for s in panel["series"]))
-    width = SINGLE_PAGE_WIDTH if len(panels) == 1 else PAGE_WIDTH
+    across = min(len(panels), most_across)
+    width = SINGLE_PAGE_WIDTH if across == 1 else PAGE_WIDTH
     room = width - LEFT - RIGHT
     columns = 2 if len(labels) > 1 and max(text_width(label, LEGEND_SIZE) for label in labels) <= room / 2 - HANDLE else 1
     entries = ["\n".join(wrapped(label.split(" "), LEGEND_SIZE, room / columns - HANDLE)) for label in labels]
     rows = -(-len(labels) // columns) + sum(entry.count("\n") for entry in entries)
     notes = wrapped((figure.get("note") or "").split(), NOTE_SIZE, room) + wrapped(provenance_note(figure), NOTE_SIZE, room, "; ")
-    across = min(len(panels), MOST_ACROSS)
     panel_width = (room - (across - 1) * GAP) / across
     titles = [wrapped(lettered(letter_of(i, len(panels)), plain_name(panel["title"])).split(" "), TITLE_SIZE,
                       panel_width + (GAP / 2 if (i + 1) % across else RIGHT - EDGE)) for i, panel in enumerate(panels)]
@@ -441,6 +442,9 @@ def save(figure, folder, pdf, png, reads):
     page = draw_figure(figure)
     save_drawing(page, folder / f"{figure['id']}.svg", lambda svg: with_own_ids(svg, figure["id"]), reads,
                  dpi=PIXELS_PER_INCH, metadata={"Date": None, "Creator": None})
+    if (pdf or png) and len(figure["panels"]) > 1:
+        plt.close(page)
+        page = draw_figure(figure, ACROSS_IN_PRINT)
     if png:
         save_drawing(page, folder / f"{figure['id']}.png", reads=reads, dpi=PIXELS_PER_INCH, metadata={"Software": None})
     if pdf:

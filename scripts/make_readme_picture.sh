@@ -1,22 +1,26 @@
 #!/usr/bin/env bash
-# Makes docs/figures/view.png, a simulation in `tpm view`, and docs/figures/first_look.png, the picture of
-# docs/haptics.md: the live page of a session on the simulated device, photographed by Chromium, beside error against
-# cost from reports/accuracy/servo_normal.csv.
-# Takes about a minute. Needs build/release/tpm (scripts/run.sh) and chromium.
+# Makes docs/figures/view.png, a simulation, and docs/figures/first_look.png, a session on the simulated device in
+# virtual time: pages of `tpm view`, photographed by Chromium at a width whose text is read at 400 pixels.
+# Takes about a minute. Needs build/release/tpm (scripts/run.sh), or TPM=FILE, and chromium.
 set -euo pipefail
 cd "$(dirname "$0")/.."
 source scripts/install_packages.sh
 source scripts/packages.sh
 install_missing "to photograph a page" chromium
-find_python numpy matplotlib
+tpm=${TPM:-build/release/tpm}
 folder=$(mktemp -d)
 trap 'rm -rf "$folder"' EXIT
-build/release/tpm simulate configs/liver_poke.json -o "$folder/poke.h5"
-build/release/tpm view "$folder/poke.h5" -o "$folder/poke.html"
-chromium --headless --no-sandbox --disable-gpu --user-data-dir="$folder/profile" --hide-scrollbars \
-  --force-device-scale-factor=2 --window-size=640,860 --virtual-time-budget=3000 \
-  --screenshot="$PWD/docs/figures/view.png" "file://$folder/poke.html"
-say "docs/figures/view.png"
-"$TPMKIT_PYTHON" tests/programs/page_in_chromium.py build/release/tpm configs/hil_surface.json "$folder/page.png" 14
-"$TPMKIT_PYTHON" scripts/draw_first_look.py "$folder/page.png" reports/accuracy/servo_normal.csv docs/figures/first_look.png
-say "docs/figures/first_look.png"
+
+photograph() {  # RESULT HEIGHT PICTURE
+  "$tpm" view "$1" -o "$folder/page.html"
+  chromium --headless --no-sandbox --disable-gpu --user-data-dir="$folder/profile" --hide-scrollbars \
+    --force-device-scale-factor=2 --window-size="640,$2" --virtual-time-budget=3000 \
+    --screenshot="$PWD/$3" "file://$folder/page.html"
+  rm "$folder/page.html"
+  say "$3"
+}
+
+"$tpm" simulate configs/liver_poke.json -o "$folder/poke.h5"
+photograph "$folder/poke.h5" 860 docs/figures/view.png
+"$tpm" hil run configs/hil_surface.json -o "$folder/slide.tpmrec"
+photograph "$folder/slide.tpmrec" 985 docs/figures/first_look.png

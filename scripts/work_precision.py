@@ -11,9 +11,10 @@ import matplotlib.pyplot as plt
 from drawing_files import text_width
 from matplotlib.lines import Line2D
 
-# Inches: two columns of a journal (180 mm); panels stand one below the other, for their points are many.
-PAGE_WIDTH, PANEL_HEIGHT, LEFT, RIGHT, TOP, BELOW_AXIS = 180 / 25.4, 3.4, 1.1, 0.12, 0.32, 0.54
-LEGEND_ROW, BAND_ROW, NOTE_ROW, COLUMNS = 0.185, 0.175, 0.165, 3
+# Inches: one and a half columns of a journal (130 mm), whose text is read at 400 pixels; panels stand one below the
+# other, for their points are many.
+PAGE_WIDTH, PANEL_HEIGHT, LEFT, RIGHT, TOP, BELOW_AXIS = 130 / 25.4, 3.4, 1.1, 0.12, 0.32, 0.54
+LEGEND_ROW, BAND_ROW, NOTE_ROW, COLUMNS = 0.185, 0.175, 0.165, 2
 BAND_SIZE, NAME_SIZE, LIMIT_SIZE, LEGEND_SIZE, NOTE_SIZE = 8, 7.5, 8, 8.5, 7.5  # points
 NAME_OF_LEVEL = 0.27  # of the width of a panel, and of its height above the line
 ABOVE_LEVEL = 0.055

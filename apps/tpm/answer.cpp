@@ -88,6 +88,10 @@ std::string next_with_law(const std::string& law, const LawSpec& spec) {
   return fmt::format("tpm export {} --to {}", file, sayable ? "febio" : "json --relaxation-only");
 }
 
+std::string next_of_pictures(const fs::path& folder) {
+  return "tpm view " + shell_word((folder / "figures.json").string());
+}
+
 std::string next_line(const std::string& next) {
   return next.empty() ? std::string() : fmt::format("next: {}\n", next);
 }

@@ -34,6 +34,9 @@ void add_end(Json& result, const std::filesystem::path& folder,
 /// @param law path of the law's file
 [[nodiscard]] std::string next_with_law(const std::string& law, const LawSpec& spec);
 
+/// The command that shows the figures that were drawn into a folder.
+[[nodiscard]] std::string next_of_pictures(const std::filesystem::path& folder);
+
 /// "next: COMMAND", the line that ends a text; none if there is no command.
 [[nodiscard]] std::string next_line(const std::string& next);
 

@@ -135,19 +135,20 @@ int benchmark(const BenchmarkChoice& choice, const Session& session) {
     write_file(part, to_text(to_json(record)));
   }
   write_benchmark(record, choice.folder, python);
+  const std::string next = next_of_pictures(choice.folder);
   if (session.json()) {
     std::vector<std::string> files{"report.html", "report.md", "benchmark.json"};
     for (const BenchmarkResult& result : record.results) files.push_back(result.name + ".csv");
     files.emplace_back(python.empty() ? "figures.json" : "figures");
     Json json = to_json(record);
-    add_end(json, choice.folder, files, {});
+    add_end(json, choice.folder, files, next);
     say("{}", answer_text(session, std::move(json)));
     return 0;
   }
   print_summary(record);
   say("written to {}: report.html, report.md, benchmark.json, a CSV for each problem, "
-      "figures\n",
-      choice.folder);
+      "{}\n{}",
+      choice.folder, python.empty() ? "figures.json" : "figures", next_line(next));
   return 0;
 }
 

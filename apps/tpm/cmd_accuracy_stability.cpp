@@ -12,6 +12,7 @@
 #include "common_options.hpp"
 #include "option_kinds.hpp"
 #include "tpm/accuracy/show/stability_report.hpp"
+#include "tpm/base/lists.hpp"
 #include "tpm/files/writable.hpp"
 #include "tpm/show/draw.hpp"
 #include "tpmkit/error.hpp"
@@ -19,14 +20,18 @@
 namespace tpm::app {
 namespace {
 
-/// Names of the files written besides the report.
-std::string tables_of(const StabilityParts& parts) {
-  std::vector<std::string> names;
+/// Names of the files that are written.
+std::vector<std::string> files_of(const StabilityStudy& study, const StabilityParts& parts,
+                                  const std::string& python) {
+  std::vector<std::string> names{"report.html", "report.md", "stability.json"};
   if (parts.limits) names.emplace_back("limits.csv");
   if (parts.limiting_cases) names.emplace_back("limiting_cases.csv");
   if (parts.servo) names.emplace_back("servo.csv");
-  if (parts.maps) names.emplace_back("map_*.csv, figures");
-  return fmt::format("{}", fmt::join(names, ", "));
+  for (const std::string& id : each_once(study.maps, &StabilityMap::id)) {
+    names.push_back(fmt::format("map_{}.csv", id));
+  }
+  if (parts.maps) names.emplace_back(python.empty() ? "figures.json" : "figures");
+  return names;
 }
 
 /// All of them if none is named.
@@ -48,12 +53,16 @@ int stability(const std::string& folder, int along, const StabilityParts& parts,
   const StabilityStudy study = run_stability_study(along, parts);
   const std::chrono::duration<double> took = std::chrono::steady_clock::now() - start;
   write_stability(study, folder, python, took.count());
+  const std::vector<std::string> files = files_of(study, parts, python);
+  const std::string next = parts.maps ? next_of_pictures(folder) : std::string();
   if (session.json()) {
-    say("{}", answer_text(session, to_json(study)));
+    Json json = to_json(study);
+    add_end(json, folder, files, next);
+    say("{}", answer_text(session, std::move(json)));
     return 0;
   }
   for (const std::string& sentence : stability_sentences(study)) say("- {}\n", sentence);
-  say("written to {}: report.html, report.md, stability.json, {}\n", folder, tables_of(parts));
+  say("written to {}: {}\n{}", folder, fmt::join(files, ", "), next_line(next));
   return 0;
 }
 

@@ -9,6 +9,7 @@
 #include "common_options.hpp"
 #include "tpm/accuracy/show/verification_report.hpp"
 #include "tpm/files/writable.hpp"
+#include "tpm/show/short_answer.hpp"
 #include "tpm/work/progress.hpp"
 #include "tpmkit/error.hpp"
 
@@ -19,7 +20,7 @@ struct VerificationChoice {
   std::vector<std::string> groups;
   std::string folder;
   std::string flaw;
-  bool list = false;
+  bool list = false, verbose = false;
 };
 
 int list_groups(const Session& session) {
@@ -45,18 +46,22 @@ int verify_program(const VerificationChoice& choice, const Session& session) {
   const std::chrono::duration<double> took = std::chrono::steady_clock::now() - start;
   if (!choice.folder.empty()) write_verification(verification, choice.folder, took.count());
   std::vector<std::string> files;
+  std::string next = same_command(session, "--folder verification");
   if (!choice.folder.empty()) {
     files = {"report.html", "report.md", "verification.json", "verification.csv"};
+    next.clear();
   }
   if (session.json()) {
     Json json = to_json(verification);
-    add_end(json, choice.folder, files, {});
+    add_end(json, choice.folder, files, next);
     say("{}", answer_text(session, std::move(json), {{"checks_hold", verification.failed() == 0}}));
   } else {
-    for (const VerificationLine& line : verification_lines(verification)) {
+    for (const VerificationLine& line :
+         choice.verbose ? verification_lines(verification) : brief_lines(verification)) {
       line.failed ? write_alarming(line.text) : write_output(line.text);
     }
-    if (!files.empty()) say("{}", written(session, choice.folder, files));
+    say("{}{}", files.empty() ? "\n" : written(session, choice.folder, files),
+        choice.verbose ? next_line(next) : end_line(next) + "\n");
   }
   return exit_code(verification.failed() == 0);
 }
@@ -75,6 +80,7 @@ void add_verify_command(CLI::App& accuracy, Session& session) {
                       "Make one coefficient of everything that is verified wrong by this share, "
                       "such as 1%, to see that the checks fail");
   command->add_flag("--list", choice->list, "List what can be named, and do nothing: the groups");
+  add_verbose_option(*command, choice->verbose, "every check, with its reference");
   add_format_option(*command, session);
   command->footer(
       "Exit code 1 if a check fails; its lines are red on a terminal.\nExamples:\n"

@@ -190,7 +190,32 @@ int copy(const Example& example, const std::string& folder, const Session& sessi
   return 0;
 }
 
+/// The arguments of the chosen command that are no options.
+std::vector<std::string> arguments_of(const CLI::App& app) {
+  std::vector<std::string> words;
+  for (const CLI::App* command : app.get_subcommands()) {
+    for (const CLI::Option* option : command->get_options()) {
+      if (!option->get_positional()) continue;
+      words.insert(words.end(), option->results().begin(), option->results().end());
+    }
+    for (std::string& word : arguments_of(*command)) words.push_back(std::move(word));
+  }
+  return words;
+}
+
 }  // namespace
+
+Error with_example(const CLI::App& app, const Error& error) {
+  for (const std::string& word : arguments_of(app)) {
+    const auto example = std::ranges::find(examples(), word, &Example::name);
+    std::error_code ec;
+    if (example == examples().end() || fs::exists(word, ec)) continue;
+    if (!std::string_view(error.what()).starts_with(word + ":")) continue;
+    return {error.code(), word, "is the name of an example, and no such file is here",
+            fmt::format("its files: tpm example {}, then {}", word, next_command(*example, {}))};
+  }
+  return error;
+}
 
 void add_example_command(CLI::App& app, Session& session) {
   struct Options {

@@ -43,14 +43,15 @@ int experiments(const ExperimentsOptions& options, const Session& session) {
                                        "fits.csv",
                                        "curves.csv",
                                        python.empty() ? "figures.json" : "figures"};
+  const std::string next = next_of_pictures(options.folder);
   if (session.json()) {
     Json json = to_json(study);
-    add_end(json, options.folder, files, {});
+    add_end(json, options.folder, files, next);
     say("{}", answer_text(session, std::move(json)));
     return 0;
   }
   for (const std::string& sentence : cost_sentences(study)) say("- {}\n", sentence);
-  say("written to {}: {}\n", options.folder, fmt::join(files, ", "));
+  say("written to {}: {}\n{}", options.folder, fmt::join(files, ", "), next_line(next));
   return 0;
 }
 

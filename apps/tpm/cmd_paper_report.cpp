@@ -1,6 +1,7 @@
 
 #include <memory>
 
+#include "answer.hpp"
 #include "command.hpp"
 #include "common_options.hpp"
 #include "tpm/paper/show/paper_report.hpp"
@@ -18,8 +19,8 @@ int report(const std::string& folder, double requirement, const Session& session
   write_paper_report(paper, folder, python);
   for (const std::string& sentence : summary_sentences(paper)) say("- {}\n", sentence);
   say("written to {}: report.html, report.md, tables.*, audit.json, fit_*.json, validation.json, "
-      "{}\n",
-      folder, python.empty() ? "figures.json" : "figures");
+      "{}\n{}",
+      folder, python.empty() ? "figures.json" : "figures", next_line(next_of_pictures(folder)));
   return 0;
 }
 

@@ -4,7 +4,6 @@
 #include <algorithm>
 #include <cmath>
 #include <filesystem>
-#include <functional>
 #include <memory>
 
 #include "answer.hpp"
@@ -16,6 +15,7 @@
 #include "tpm/files/file_roles.hpp"
 #include "tpm/fit/likelihood/fit_keys.hpp"
 #include "tpm/show/draw.hpp"
+#include "tpm/show/short_answer.hpp"
 #include "tpm/sweep/best_cells.hpp"
 #include "tpm/sweep/show/sweep_convergence_report.hpp"
 #include "tpm/sweep/show/sweep_report.hpp"
@@ -31,6 +31,7 @@ struct SweepViewChoice {
   std::string axis, size, figure_folder;
   std::string best_output, count = "1", over, fit, start;
   std::vector<std::string> variables, at;
+  bool verbose = false;
 };
 
 int show(const SweepViewChoice& choice, const Session& session) {
@@ -72,17 +73,17 @@ std::pair<std::string, std::uint64_t> parse_fixed(const std::string& text,
   return {name, static_cast<std::uint64_t>(nearest - axis.places.begin())};
 }
 
-/// The page of figures that were drawn into a folder.
-std::string next_of_pictures(const std::string& folder) {
-  return "tpm view " + shell_word((fs::path(folder) / "figures.json").string());
-}
-
 /// Prints an answer; pictures beside it, if a folder was named, else the command that draws them.
-void say_and_draw(const std::string& folder, const std::function<std::vector<Figure>()>& figures,
-                  Json json, std::string text, const std::vector<Verdict>& verdicts,
+/// @param all results with `short_answer`
+/// @param text everything, for --verbose
+template <class Results>
+void say_and_draw(const SweepViewChoice& choice, const std::vector<Results>& all,
+                  const std::vector<Figure>& figures, Json json, std::string text,
+                  const std::string& title, const std::vector<Verdict>& verdicts,
                   const Session& session) {
+  const std::string& folder = choice.figure_folder;
   std::vector<std::string> files;
-  if (!folder.empty()) files = write_figures(folder, figures());
+  if (!folder.empty()) files = write_figures(folder, figures);
   const std::string next =
       folder.empty() ? same_command(session, "--folder figures") : next_of_pictures(folder);
   if (session.json()) {
@@ -90,8 +91,14 @@ void say_and_draw(const std::string& folder, const std::function<std::vector<Fig
     say("{}", answer_text(session, std::move(json), verdicts));
     return;
   }
-  if (!files.empty()) text += written(session, folder, files);
-  say("{}{}", text, next_line(next));
+  if (choice.verbose) {
+    if (!files.empty()) text += written(session, folder, files);
+    say("{}{}", text, next_line(next));
+    return;
+  }
+  ShortAnswer answer = short_answer(all, title);
+  end_answer(answer, folder, files, next);
+  say("{}", to_text(answer));
 }
 
 int sensitivity(const SweepViewChoice& choice, const Session& session) {
@@ -106,9 +113,8 @@ int sensitivity(const SweepViewChoice& choice, const Session& session) {
     if (wished) all.push_back(sensitivity_of(sweep, v.name, fixed));
   }
   for (const std::string& name : choice.variables) static_cast<void>(sweep.variable(name));
-  say_and_draw(
-      choice.figure_folder, [&] { return sensitivity_figures(all, sweep.title()); },
-      sensitivity_json(all), sensitivity_text(all), {}, session);
+  say_and_draw(choice, all, sensitivity_figures(all, sweep.title()), sensitivity_json(all),
+               sensitivity_text(all), sweep.title(), {}, session);
   return 0;
 }
 
@@ -128,9 +134,8 @@ int convergence(const SweepViewChoice& choice, const Session& session) {
     return convergence_of(sweep, name, axis, choice.size, fixed);
   });
   const bool monotone = std::ranges::any_of(all, &SweepConvergence::monotone);
-  say_and_draw(
-      choice.figure_folder, [&] { return convergence_figures(all, sweep.title()); },
-      convergence_json(all), convergence_text(all), {{"monotone", monotone}}, session);
+  say_and_draw(choice, all, convergence_figures(all, sweep.title()), convergence_json(all),
+               convergence_text(all), sweep.title(), {{"monotone", monotone}}, session);
   return exit_code(monotone);
 }
 
@@ -236,6 +241,7 @@ void add_sweep_views(CLI::App& sweep, Session& session) {
   add_variables(*command, *choice);
   command->add_option("--at", choice->at, "Place on an axis, AXIS=VALUE: beside the samples");
   add_folder_option(*command, choice->figure_folder, ": figures (SVG, PNG)");
+  add_verbose_option(*command, choice->verbose, "both indices of every parameter");
   add_force_option(*command, session);
   add_format_option(*command, session);
   command->footer(
@@ -252,6 +258,7 @@ void add_sweep_views(CLI::App& sweep, Session& session) {
   add_variables(*refining, *choice);
   refining->add_option("--at", choice->at, "Place on an axis, AXIS=VALUE: another than --axis");
   add_folder_option(*refining, choice->figure_folder, ": figures (SVG, PNG)");
+  add_verbose_option(*refining, choice->verbose, "every size, with its order and limit");
   add_force_option(*refining, session);
   add_format_option(*refining, session);
   refining->footer(

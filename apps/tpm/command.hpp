@@ -53,6 +53,10 @@ void add_force_option(CLI::App& command, Session& session);
 /// --overwrite was given: neither can be made again.
 void require_new(const std::string& output, const Session& session);
 
+/// The error of the chosen command, or, where it refuses a file that was named like an example of
+/// tpm example, one that says how to come by that example's files.
+[[nodiscard]] Error with_example(const CLI::App& app, const Error& error);
+
 /// Adds -o, --output for an answer beside which a table stands (csv_beside()).
 void add_output_option(CLI::App& command, std::string& output);
 

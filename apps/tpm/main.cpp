@@ -294,7 +294,11 @@ int run(int argc, char** argv) {
   session.command = words_of_command(app);
   roles.mark_results(origin_of(app), session.force);
   announce_output(app, session);
-  return session.run();
+  try {
+    return session.run();
+  } catch (const Error& error) {
+    throw with_example(app, error);
+  }
 }
 
 /// A closed standard stream would hand its number to the next file that is opened, and messages

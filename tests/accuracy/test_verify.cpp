@@ -143,6 +143,12 @@ TEST_CASE("verification: of rows that hold and rows that fail, only the latter a
     CAPTURE(line.text);
     CHECK(line.failed == (line.text.find("FAIL") != std::string::npos));
   }
+  // In brief: the verdict, each group, what failed.
+  const std::vector<VerificationLine> brief = brief_lines(run);
+  REQUIRE(brief.size() == 4);
+  CHECK(brief[0].text == "4 checks: 2 FAILED.\n");
+  CHECK(brief[1].text == "  stand-in: 2 of 4 hold\n");
+  for (const VerificationLine& line : brief) CHECK(line.failed);
   const test::TempFolder folder;
   write_verification(run, folder / "page", 1.0);
   const std::string page = read_file(folder / "page/report.html");
@@ -174,6 +180,12 @@ TEST_CASE("verification: a problem has a table, whose rows name the method alone
       run.rows.push_back(std::move(row));
     }
   }
+  // In brief: the verdict, each group, what failed.
+  const std::vector<VerificationLine> brief = brief_lines(run);
+  REQUIRE(brief.size() == 4);
+  CHECK(brief[0].text == "4 checks: 2 FAILED.\n");
+  CHECK(brief[1].text == "  stand-in: 2 of 4 hold\n");
+  for (const VerificationLine& line : brief) CHECK(line.failed);
   const test::TempFolder folder;
   write_verification(run, folder / "page", 1.0);
   const std::string text = read_file(folder / "page/report.md");

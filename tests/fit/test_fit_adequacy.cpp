@@ -9,6 +9,7 @@
 #include "placed_recordings.hpp"
 #include "support/remarks.hpp"
 #include "temp_folder.hpp"
+#include "tpm/base/text.hpp"
 #include "tpm/files/blocks/law_export.hpp"
 #include "tpm/fit/adequacy.hpp"
 #include "tpm/fit/fitted_law.hpp"
@@ -331,8 +332,26 @@ TEST_CASE("a stated size of the noise is what residuals are compared with", "[ad
   CHECK(verdict(test::kNoise_N).is_adequate());
   const LawAdequacy wrong = verdict(test::kNoise_N / 3.0);
   CHECK(wrong.is_rejected());
-  CHECK_THAT(wrong.summary, Contains("times the noise that is stated"));
+  CHECK_THAT(wrong.summary,
+             Contains("times the noise that is stated, p = ") && Contains(" is below 1 %"));
   CHECK(wrong.residual_over_noise.value() == Approx(3.0).epsilon(0.15));
+}
+
+TEST_CASE(
+    "the verdict on readings is that of the p printed beside chi-square, missed bands included",
+    "[adequacy]") {
+  for (const auto& [file, adequate] :
+       {std::pair{"liver_relaxation.json", true}, {"liver_all.json", false}}) {
+    CAPTURE(file);
+    FitProblem problem = read_fit_problem(std::string(TPM_TEST_SOURCE_DIR "/configs/") + file);
+    problem.config.starts = 5;
+    const FitResult fit = fit_and_judge(problem);
+    const double p = fit.chi_square_p.value();
+    CHECK((p >= 0.01) == adequate);
+    CHECK(fit.adequacy.value().is_adequate() == adequate);
+    CHECK_THAT(fit.adequacy->summary, Contains(", p = " + base::significant(p, 2) + " is "));
+    CHECK(fit.parameters.front().only_if_described == !adequate);
+  }
 }
 
 TEST_CASE("what is pooled over a recording that the law does not describe is not called identified",

@@ -85,7 +85,8 @@ UNENDED = ("data show", "data check", "laws power-2", "design --laws", "hil devi
 # Of the quick ones the text is compared, too: it ends with the same command.
 QUICK = ("example", "data ", "fit recording.csv", 'fit "my', "predict", "validate ", "budget ", "design CONFIGS/design_liver.json",
          "laws", "network", "paper", "sweep", "view", "plan CONFIGS/plan/star.json --costs nominal --estimate")
-# Commands to type next that take minutes: read, not run.
+WRITTEN = ("-o", "--output", "--folder")
+# Commands to type next that take minutes: read, not run; their files must be there.
 LONG = ("tpm paper report", "tpm plan configs/", "tpm accuracy", "tpm fit ")
 
 
@@ -183,11 +184,20 @@ def faults_of_line(line, usage):
     return faults
 
 
-def faults_of_next(line, usage, program, folder):
+def faults_of_files(line, root, folder):
+    """Files that a command to type next reads and that are neither beside the answer's files nor shipped."""
+    words = shlex.split(line)
+    read = [word for before, word in zip(words, words[1:]) if before not in WRITTEN and re.search(r"[.](csv|h5|json|tpmrec)$", word)]
+    shipped = [root / word for word in read if word.startswith("configs/")]
+    beside = [folder / word for word in read if not word.startswith("configs/")]
+    return [f"'{line}': {file} does not exist" for file in shipped + beside if not file.is_file()]
+
+
+def faults_of_next(line, usage, program, root, folder):
     """Types a command that an answer names, beside the files of that answer."""
     faults = faults_of_line(line, usage)
     if faults or line.startswith(LONG):
-        return faults
+        return faults + faults_of_files(line, root, folder)
     with tempfile.TemporaryDirectory() as name:
         there = Path(name) / "typed"
         shutil.copytree(folder, there)
@@ -256,7 +266,7 @@ def main():
                 wrong.append("files or next are missing")
             if answer.get("next") and answer["next"] not in typed:
                 typed.add(answer["next"])
-                wrong += faults_of_next(answer["next"], usage, program, folder)
+                wrong += faults_of_next(answer["next"], usage, program, root, folder)
             faults += len(wrong)
             for fault in wrong:
                 print(f"tpm {line}: {fault}")

@@ -155,6 +155,23 @@ def no_recording(tpm, work):
     check(run.stderr.endswith("tpm data show literature_values\n"), run.stderr)
 
 
+def name_for_a_file(tpm, work):
+    """An example's name where a file is expected: every command says how to come by the files."""
+    empty = work / "names"
+    empty.mkdir()
+    press = ("--depth", "2 mm", "--rate", "2 mm/s", "--hold", "3 s")
+    for name in [one["name"] for one in json.loads(tpm(empty, "example", "--format", "json").stdout)["examples"]]:
+        for words in (("fit", name), ("predict", name, *press), ("validate", name, "data/evren_static.csv"), ("simulate", name), ("plan", name),
+                      ("sweep", name), ("hil", "run", name, "-o", "s.tpmrec"), ("paper", "audit", name), ("design", name),
+                      ("budget", name, *press), ("view", name), ("identify", name), ("network", "check", name)):
+            run = tpm(empty, *words, code=3)
+            told = f"tpm: {name}: is the name of an example, and no such file is here; expected its files: tpm example {name}, then tpm "
+            check(run.stderr.splitlines()[-1].startswith(told), f"tpm {' '.join(words)}: {run.stderr}")
+        check(not any(empty.iterdir()), f"something was left in {empty}")
+    (empty / "organ").write_text("{}")  # a file of that name is the user's
+    check("is the name of an example" not in tpm(empty, "simulate", "organ", code=3).stderr, "organ is a file")
+
+
 def example_client(tpm, work):
     """The client of tpm hil serve is installed, too, and needs nothing but Python."""
     client = tpm.file.parent.parent / "share/tpmkit/examples/inverse_client.py"
@@ -175,6 +192,7 @@ def main():
         without_permission(tpm, work)
         shipped_stand_in(tpm, work)
         no_recording(tpm, work)
+        name_for_a_file(tpm, work)
         example_client(tpm, work)
     for fault in FAULTS:
         print(fault)

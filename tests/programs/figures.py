@@ -110,24 +110,24 @@ def faults_of_trails(folder):
 
 
 def faults_of_layout(drawing):
-    """Three panels do not stand side by side, and no text leaves the page: half of 400 pixels is enough for a panel."""
+    """On a screen three panels stand below each other, and no text leaves the page, whose text is read at 400 pixels."""
     root = drawing.getroot()
     width = float(root.get("viewBox").split()[2])
-    faults = [] if abs(width - 180 / 25.4 * 72) < 0.1 else [f"a figure of three panels is {width} points wide"]
+    faults = [] if abs(width - 130 / 25.4 * 72) < 0.1 else [f"a figure of three panels is {width} points wide"]
     panels = {}
     for group in root.iter("{http://www.w3.org/2000/svg}g"):
         if "axes_" in group.get("id", ""):
             numbers = group.find(".//{http://www.w3.org/2000/svg}path").get("d").split()
             panels[group.get("id")] = round(float(numbers[1]))
-    if len(panels) != 3 or len(set(panels.values())) != 2:
-        faults.append(f"three panels do not stand in two columns: left edges {panels}")
+    if len(panels) != 3 or len(set(panels.values())) != 1:
+        faults.append(f"three panels do not stand below each other: left edges {panels}")
     from drawing_files import text_width
     for line in (e for e in root.iter() if e.tag.endswith("}text") and "title of a panel" in (e.text or "")):
         end = float(re.search(r"[(=] ?([0-9.]+)", line.get("transform") or f"={line.get('x')}")[1]) + 72 * text_width(line.text, 9.5)
         if end > width:
             faults.append(f"a title ends at {end:.0f} points, the page at {width:.0f}: {line.text}")
     words = [e.text for e in root.iter() if e.tag.endswith("}text")]
-    if any(len(w or "") > 110 for w in words) or any("A title" in (w or "") and len(w) > 60 for w in words):
+    if any(len(w or "") > 110 for w in words) or any("A title" in (w or "") and len(w) > 75 for w in words):
         faults.append(f"a text is not wrapped: {words}")
     return faults
 
@@ -171,6 +171,9 @@ def main():
         png = (folder / "x/a.png").read_bytes()
         if int.from_bytes(png[16:20], "big") != int(180 / 25.4 * 300):
             faults.append("the PNG has not 300 dpi, or is not as wide as two columns of a journal (180 mm)")
+        sizes = [[int.from_bytes((folder / f"x/{id}.png").read_bytes()[at:at + 4], "big") for at in (16, 20)] for id in "ad"]
+        if sizes[0][0] != sizes[1][0] or not sizes[0][1] < sizes[1][1] < 2.5 * sizes[0][1]:
+            faults.append(f"in print three panels do not stand in two rows: pictures of {sizes} pixels")
         subprocess.run([sys.executable, SCRIPT, folder / "figures.json", folder / "pdf", "--pdf"], check=True)
         if {f.name for f in (folder / "pdf").iterdir()} != {f"{id}.{ending}" for id in "abcd" for ending in ("svg", "pdf")}:
             faults.append(f"--pdf wrote {sorted(f.name for f in (folder / 'pdf').iterdir())}")

@@ -75,7 +75,7 @@ class Checks:
         if "more: --verbose" not in lines[-1]:
             self.faults.append(f"{name}: ends with '{lines[-1]}'")
         self.faults += [f"{name}: leaves out the warning '{one}'" for one in left_out(said, told)]
-        command = tuple(words[:2] if words[0] in ("hil", "paper") else words[:1])
+        command = tuple(words[:2] if words[0] in ("hil", "paper", "sweep", "accuracy") else words[:1])
         if command not in self.verbose and len(self.run(*words, "--verbose").stdout) <= 0.5 * len(said.stdout):
             self.faults.append(f"{name}: says less with --verbose")
         self.verbose.add(command)
@@ -158,6 +158,13 @@ def main():
             checks.check_next(["sweep", sweep, "-o", "sweep.h5"], "tpm sweep plot sweep.h5")
         checks.check_next(["sweep", sweep, "--shard", "1/2", "-o", "parts.h5"], f"tpm sweep {sweep} --shard 2/2 -o parts.h5")
         checks.check_next(["sweep", sweep, "--shard", "2/2", "-o", "parts.h5"], f"tpm sweep merge {sweep} -o parts.h5")
+        checks.run("sweep", root / "configs/sweep_sensitivity.json", "-o", "samples.h5")
+        checks.check(["sweep", "sensitivity", "samples.h5"], remarks)
+        checks.run("sweep", root / "configs/sweep_convergence_step.json", "-o", "step.h5")
+        checks.check(["sweep", "convergence", "step.h5", "--axis", "step"], remarks, (0, 1))
+        checks.check(["accuracy", "verify", "closed-forms", "energy"], remarks)
+        checks.check(["accuracy", "verify", "--flaw", "1%"], remarks, (1,))
+        checks.check(["hil", "stability", "--folder", "borders", "--overwrite"], remarks)
         starts = json.loads(checks.run("fit", "fitted/config.json", "--no-draw", "--format", "json").stdout)["starts"]
         count = f"{starts['agreeing_to_5_digits']} of {starts['run']}"
         if (f"{count} followed starts" not in checks.run("fit", "fitted/config.json", "--no-draw").stdout

@@ -97,7 +97,10 @@ class Fits(unittest.TestCase):
         self.assertEqual(axes.get_xlabel(), "time (s)")
         self.assertEqual(axes.get_ylabel(), "force (N)")
         self.assertGreaterEqual(len(axes.lines), 3)
-        self.assertIn("tau1", self.fit._repr_html_())
+        page = self.fit._repr_html_()
+        estimate = self.fit.parameters.loc["tau1", "estimate"]
+        self.assertIn(f"<td>{estimate:.5g}</td>", page)  # the digits that tpm fit prints
+        self.assertIn(f" {estimate:.5g} (", repr(self.fit))
 
     def test_equal_seeds_give_equal_answers_and_a_law_can_be_asked_for(self):
         one, two = (tpmkit.fit(self.file, law="power-1", starts=5, seed=0) for _ in range(2))

@@ -72,6 +72,11 @@ TEST_CASE("a file of results is read back by axes, either way round, and drawn")
   along.variables = {"end_force"};
   CHECK(sweep_figures(reader, along)[0].panels[0].x.quantity == "E1");
   CHECK_FALSE(to_text(to_json(figures)).empty());  // it can be drawn
+  const Axis& force = figures[4].panels[0].x;      // a name in words, its unit of the size
+  CHECK(force.quantity == "peak force");
+  double largest = 0.0;
+  for (const double v : figures[4].panels[0].series[0].x) largest = std::max(largest, std::abs(v));
+  CHECK(largest > 0.1);
   CHECK(sweep_text(reader).find("12 skipped, 16 failed") != std::string::npos);
 }
 
@@ -165,7 +170,15 @@ TEST_CASE("sensitivity of a sum: each term's share of the variance") {
   const SweepSensitivity peak = sensitivity_of(reader, "peak_force", {});
   CHECK(peak.indices.inputs[0].total.value == 0.0);
   CHECK(sensitivity_text({sum, peak}).find("E2") != std::string::npos);
-  CHECK_FALSE(to_text(to_json(sensitivity_figures({sum, peak}, "title"))).empty());
+  const ShortAnswer answer = short_answer(std::vector{sum, peak}, "title");
+  REQUIRE(answer.rows.size() == 2);  // of each number the parameters, the decisive one first
+  CHECK_THAT(answer.rows[0],
+             Catch::StartsWith("sum at depth = 8 mm") && Catch::Contains(" E2 0.8"));
+  CHECK_THAT(answer.rows[1], Catch::StartsWith("peak_force") && Catch::Contains(" N ") &&
+                                 Catch::Contains(" E2 1.00"));
+  const auto figures = sensitivity_figures({sum, peak}, "title");
+  CHECK_FALSE(to_text(to_json(figures)).empty());
+  CHECK(figures[1].title == "peak force");
   const Sweep plain = parsed(kMixed);
   static_cast<void>(result_of(plain, folder / "b.h5"));
   CHECK(test::refusal_of([&] {

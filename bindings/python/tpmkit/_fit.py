@@ -426,7 +426,8 @@ class Fit:
         return _unpickled, (_answers_of(self._core), self._inputs)
 
     def _repr_html_(self) -> str:
-        table = self.parameters.to_html(float_format=lambda v: f"{v:.4g}")
+        digits = {"estimate": "{:.5g}".format, "standard_error": "{:.3g}".format}  # as tpm fit prints them
+        table = self.parameters.to_html(formatters=digits, float_format=lambda v: f"{v:.4g}")
         return table + "".join(f"<p>{html.escape(words)}</p>" for words in self._remarks_shown())
 
     def _judged(self) -> dict[str, Any]:

@@ -18,6 +18,10 @@ namespace tpm::base {
 /// Significant digits of the numbers of results in JSON and CSV, where no other number is given.
 inline constexpr int kResultDigits = 6;
 
+/// Significant digits of an estimate in tables that people read (terminal, page, Python), of the
+/// ends of its interval and of values in sentences, and of its standard error.
+inline constexpr int kEstimateDigits = 5, kIntervalDigits = 4, kErrorDigits = 3;
+
 /// The double nearest to `value` written with `digits` significant digits: what results store so
 /// that they agree between machines, whose last bits differ. Non-finite values stay as they are.
 [[nodiscard]] double rounded(double value, int digits = kResultDigits);

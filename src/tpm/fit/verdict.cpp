@@ -59,9 +59,20 @@ std::string in_unit(const FitParameter& parameter, double natural) {
 }
 
 double size_of(const ParameterResult& p) {
+  return size_of(p.estimate, p.lower, p.upper);
+}
+
+double size_of(double estimate, const std::optional<double>& lower,
+               const std::optional<double>& upper) {
   constexpr double kNearZero = 0.01;  // of the further limit
-  const double limit = std::max(std::abs(p.lower.value_or(0.0)), std::abs(p.upper.value_or(0.0)));
-  return std::abs(p.estimate) < kNearZero * limit ? limit : p.estimate;
+  const double limit = std::max(std::abs(lower.value_or(0.0)), std::abs(upper.value_or(0.0)));
+  return std::abs(estimate) < kNearZero * limit ? limit : estimate;
+}
+
+std::string estimate_text(double estimate, double size, const Unit& unit) {
+  constexpr double kNothing = 1e-4;  // of the size of the row
+  const double shown = std::abs(estimate) < kNothing * std::abs(size) ? 0.0 : estimate;
+  return significant(shown / unit.to_si, kEstimateDigits);
 }
 
 std::string in_sized_unit(const ParameterResult& p, double natural) {
@@ -210,7 +221,7 @@ std::string limit_text(const ParameterResult& p, bool upper) {
 
 std::string limit_text(const ParameterResult& p, bool upper, const Unit& unit) {
   const std::optional<double>& limit = upper ? p.upper : p.lower;
-  if (limit) return significant(*limit / unit.to_si, 4);
+  if (limit) return significant(*limit / unit.to_si, kIntervalDigits);
   return has_failed(upper ? p.profile.above : p.profile.below) ? "failed" : "open";
 }
 

@@ -19,6 +19,11 @@ namespace tpm::fit {
 /// Number that the unit of a parameter is chosen by (sized_unit()): its estimate, or the further
 /// limit where the estimate is near 0 and says nothing of the size of the interval.
 [[nodiscard]] double size_of(const ParameterResult& parameter);
+[[nodiscard]] double size_of(double estimate, const std::optional<double>& lower,
+                             const std::optional<double>& upper);
+
+/// An estimate in a table, kEstimateDigits of it in `unit`; 0 where it is nothing beside its size.
+[[nodiscard]] std::string estimate_text(double estimate, double size, const Unit& unit);
 
 /// "215.7 uN": a value in the unit in which a short answer shows the parameter, 4 significant
 /// digits.

@@ -35,12 +35,12 @@ th, td { padding: .3rem .7rem; border-bottom: 1px solid var(--rule); text-align:
          min-width: 3.2rem; }
 th { background: var(--tint); }
 td.number, th.number { text-align: right; font-variant-numeric: tabular-nums; white-space: nowrap; }
+td.long { min-width: 15rem; }
 .good { color: #0b5d2a; } td.good { background: #e9f6ec; }
 .fair { color: #6b4a00; } td.fair { background: #fdf3dc; }
 .bad { color: #93200f; } td.bad { background: #fdebe7; }
-figure { margin: 1.2rem 0 1.8rem; overflow-x: auto; }
-figure svg { display: block; max-width: none; }
-@media (min-width: 58rem) { figure svg { max-width: 100%; height: auto; } }
+figure { margin: 1.2rem 0 1.8rem; }
+figure svg { display: block; max-width: 100%; height: auto; }
 figcaption { color: var(--soft); font-size: .92rem; max-width: 46rem; }
 figcaption b { color: var(--ink); }
 @media print {
@@ -48,8 +48,7 @@ figcaption b { color: var(--ink); }
   nav { display: none; }
   h2 { break-after: avoid; } h3 { break-after: avoid; }
   figure, tr { break-inside: avoid; }
-  .wide, figure { overflow: visible; }
-  figure svg { max-width: 100%; height: auto; }
+  .wide { overflow: visible; }
 }
 )css";
 
@@ -63,7 +62,8 @@ constexpr std::string_view kStackingStyle =
   table.stacks tr { display: block; padding: .4rem 0; border-bottom: 1px solid var(--rule); }
   table.stacks td { display: flex; justify-content: space-between; gap: 1rem; border: 0; padding: .1rem .3rem;
                     overflow-wrap: anywhere; }
-  table.stacks td::before { content: attr(data-title); color: var(--soft); }
+  table.stacks td.long { min-width: 0; }
+  table.stacks td::before { content: attr(data-title); color: var(--soft); flex: none; max-width: 45%; }
 }
 )css";
 
@@ -119,9 +119,10 @@ std::string html_escaped(const std::string& text) {
 constexpr auto kToneClasses =
     std::to_array<Word<Tone>>({{Tone::good, "good"}, {Tone::fair, "fair"}, {Tone::bad, "bad"}});
 
-/// ` class="number good"`, or nothing.
-std::string class_attribute(bool numeric, Tone tone) {
-  std::string classes = numeric ? "number" : "";
+/// ` class="number good"`, or nothing. A cell of a sentence keeps a width in which it can be read.
+std::string class_attribute(bool numeric, Tone tone, std::string_view text = {}) {
+  constexpr std::size_t kSentence = 40;  // characters
+  std::string classes = numeric ? "number" : text.size() > kSentence ? "long" : "";
   const std::string_view tint = word_for(kToneClasses, tone);
   if (!tint.empty()) classes += (classes.empty() ? "" : " ") + std::string(tint);
   return classes.empty() ? "" : fmt::format(" class=\"{}\"", classes);
@@ -197,7 +198,8 @@ struct HtmlBlock {
                          : "";
         const std::string text = html_escaped(row[i].text);
         out += fmt::format(
-            "<td{}{}>{}</td>", class_attribute(table.columns[i].numeric, row[i].tone), title,
+            "<td{}{}>{}</td>", class_attribute(table.columns[i].numeric, row[i].tone, row[i].text),
+            title,
             row[i].file.empty() ? text
                                 : fmt::format("<a href=\"{}\">{}</a>", address(row[i].file), text));
       }

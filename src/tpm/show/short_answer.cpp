@@ -100,13 +100,16 @@ std::vector<std::string> counted(std::vector<std::string> lines, std::size_t mos
   return lines;
 }
 
+std::string end_line(const std::string& next) {
+  return next.empty() ? "more: --verbose" : fmt::format("more: --verbose; next: {}", next);
+}
+
 void end_answer(ShortAnswer& answer, const std::string& folder,
                 const std::vector<std::string>& files, const std::string& next) {
   if (!files.empty()) {
     answer.end.push_back(fmt::format("written to {}: {}", folder, fmt::join(files, ", ")));
   }
-  answer.end.push_back(next.empty() ? std::string("more: --verbose")
-                                    : fmt::format("more: --verbose; next: {}", next));
+  answer.end.push_back(end_line(next));
 }
 
 }  // namespace tpm::show

@@ -36,6 +36,10 @@ struct ShortAnswer {
 [[nodiscard]] std::vector<std::string> counted(std::vector<std::string> lines, std::size_t most,
                                                const char* what);
 
+/// "more: --verbose; next: COMMAND", the last line of a short answer.
+/// @param next may be empty
+[[nodiscard]] std::string end_line(const std::string& next);
+
 /// Adds the lines that end an answer: the files of a folder, where the rest is, what to type next.
 /// @param files may be empty: nothing was written
 void end_answer(ShortAnswer& answer, const std::string& folder,

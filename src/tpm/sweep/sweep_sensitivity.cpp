@@ -9,7 +9,8 @@ SweepSensitivity sensitivity_of(const SweepReader& sweep, const std::string& var
   for (const ReadAxis& axis : sweep.axes()) {
     const AxisKeys said = sweep.said_of(axis);
     if (said.kind != AxisKind::samples || said.points != PointKind::sensitivity) continue;
-    SweepSensitivity found{variable, axis.parameters, {}, {}, other_places(sweep, axis, fixed)};
+    SweepSensitivity found{variable, sweep.variable(variable).unit,   axis.parameters, {},
+                           {},       other_places(sweep, axis, fixed)};
     found.design = {static_cast<int>(axis.parameters.size()), said.count, said.replicates.value(),
                     said.seed};
     found.indices = sobol_indices(found.design, sweep.slice(variable, {}, axis.name, fixed), level);

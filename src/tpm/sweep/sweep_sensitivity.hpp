@@ -9,7 +9,7 @@ namespace tpm::sweep {
 
 /// Sobol indices of a number over an axis of samples of the kind `sensitivity`.
 struct SweepSensitivity {
-  std::string variable;
+  std::string variable, unit;           ///< SI unit
   std::vector<std::string> parameters;  ///< in the order of `indices.inputs`
   SensitivityDesign design;
   SensitivityResult indices;

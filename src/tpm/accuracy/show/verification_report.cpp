@@ -97,6 +97,21 @@ std::string flaw_words(double flaw) {
       significant(100.0 * flaw, 3));
 }
 
+/// "orders: 41 of 41 hold" of each group.
+std::vector<VerificationLine> group_lines(const VerificationRun& verification) {
+  std::vector<VerificationLine> lines;
+  for (const std::string& name : each_once(verification.rows, &VerificationRow::group)) {
+    std::size_t all = 0, held = 0;
+    for (const VerificationRow& row : verification.rows) {
+      if (row.group != name) continue;
+      ++all;
+      held += row.holds() ? 1 : 0;
+    }
+    lines.push_back({fmt::format("{}: {} of {} hold", name, held, all), held != all});
+  }
+  return lines;
+}
+
 Document verification_document(const VerificationRun& verification) {
   Document document;
   document.title = "Verification of tpm";
@@ -105,15 +120,8 @@ Document verification_document(const VerificationRun& verification) {
   std::vector<Cell> items{
       {verification_words(verification), verification.failed() == 0 ? Tone::good : Tone::bad}};
   if (verification.flaw != 0.0) items.push_back({flaw_words(verification.flaw), Tone::bad});
-  for (const std::string& name : each_once(verification.rows, &VerificationRow::group)) {
-    std::size_t all = 0, held = 0;
-    for (const VerificationRow& row : verification.rows) {
-      if (row.group != name) continue;
-      ++all;
-      held += row.holds() ? 1 : 0;
-    }
-    items.push_back(
-        {fmt::format("{}: {} of {} hold", name, held, all), held == all ? Tone::good : Tone::bad});
+  for (VerificationLine& line : group_lines(verification)) {
+    items.push_back({std::move(line.text), line.failed ? Tone::bad : Tone::good});
   }
   document.bullets(std::move(items));
   document.paragraph(
@@ -141,6 +149,27 @@ std::string verification_words(const VerificationRun& verification) {
   const std::size_t failed = verification.failed();
   return failed == 0 ? fmt::format("{} checks: all hold.", verification.rows.size())
                      : fmt::format("{} checks: {} FAILED.", verification.rows.size(), failed);
+}
+
+std::vector<VerificationLine> brief_lines(const VerificationRun& verification) {
+  constexpr std::size_t kMostShown = 12;
+  std::vector<VerificationLine> lines{
+      {verification_words(verification) + "\n", verification.failed() > 0}};
+  if (verification.flaw != 0.0) lines.push_back({flaw_words(verification.flaw) + "\n", true});
+  for (VerificationLine& line : group_lines(verification)) {
+    lines.push_back({"  " + line.text + "\n", line.failed});
+  }
+  std::size_t shown = 0;
+  for (const VerificationRow& row : verification.rows) {
+    if (row.holds() || shown++ >= kMostShown) continue;
+    lines.push_back({fmt::format("{}  {}: {}: {}, required {}\n", verdict_of(row), row.what,
+                                 row.quantity, measured_words(row), expected_words(row)),
+                     true});
+  }
+  if (shown > kMostShown) {
+    lines.push_back({fmt::format("... and {} more FAIL\n", shown - kMostShown), true});
+  }
+  return lines;
 }
 
 std::vector<VerificationLine> verification_lines(const VerificationRun& verification) {

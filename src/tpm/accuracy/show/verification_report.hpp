@@ -15,6 +15,8 @@ struct VerificationLine {
   std::string text;
   bool failed = false;
 };
+/// verification_words(), a line for each group, and the first checks that failed.
+[[nodiscard]] std::vector<VerificationLine> brief_lines(const VerificationRun& verification);
 /// A table for a terminal, then verification_words().
 [[nodiscard]] std::vector<VerificationLine> verification_lines(const VerificationRun& verification);
 

@@ -231,11 +231,12 @@ std::string to_terminal_text(const YoungModuli& moduli) {
   constexpr double kKilo = 1e3;
   for (const YoungModulus& m : moduli.moduli) {
     const auto shown = [](const std::optional<double>& value, const char* otherwise) {
-      return value ? significant(*value / kKilo, 4) : std::string(otherwise);
+      return value ? significant(*value / kKilo, kIntervalDigits) : std::string(otherwise);
     };
     text += fmt::format(
-        "{:<10} {:>12} {:>12}  {:<24} {:<10} {}{}{}\n", m.name, significant(m.estimate / kKilo, 5),
-        m.standard_error ? significant(*m.standard_error / kKilo, 3) : "-",
+        "{:<10} {:>12} {:>12}  {:<24} {:<10} {}{}{}\n", m.name,
+        significant(m.estimate / kKilo, kEstimateDigits),
+        m.standard_error ? significant(*m.standard_error / kKilo, kErrorDigits) : "-",
         fmt::format("{} .. {}", shown(m.lower, "open"), shown(m.upper, "open")), "k" + m.unit, m.of,
         m.basis == "linearised" ? "; interval from the covariance" : "",
         m.verdict.empty() ? "" : "; " + m.verdict);

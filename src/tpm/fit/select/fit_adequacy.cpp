@@ -205,16 +205,16 @@ double degrees_of(const RecordingFit& fit) {
   return n * (1.0 - upper * upper) / (1.0 + upper * upper);
 }
 
-/// The residuals against noise whose size the configuration states. None if it does not state it
-/// as a normal law, or if nothing is left to test.
+/// The residuals against noise whose size the configuration states, bands that are missed among
+/// them: of readings alone FitResult::chi_square_p. None if it is no normal law, or if nothing is
+/// left to test.
 std::optional<Judged> against_stated_noise(const FitResult& fit) {
   if (!fit.chi_square_p) return std::nullopt;
-  double squares = 0.0;
-  double degrees = 0.0;
+  double squares = 0.0, degrees = 0.0;
   for (const FittedDatum& d : fit.data) {
-    if (d.datum.held_out || !d.datum.value) continue;
+    if (d.datum.held_out) continue;
     squares += d.standardised * d.standardised;
-    degrees += 1.0;
+    degrees += d.datum.value ? 1.0 : 0.0;
   }
   for (const RecordingFit& r : fit.recordings) {
     for (std::size_t i = 0; i < r.standardised.size(); ++i) {
@@ -234,11 +234,11 @@ std::optional<Judged> against_stated_noise(const FitResult& fit) {
 
 std::string times_the_noise(const Judged& judged) {
   if (!judged.drift_off.empty()) return judged.drift_off;
-  return fmt::format("residual {} times the noise {}",
-                     times_text(judged.adequacy.residual_over_noise),
-                     judged.noise_was_stated            ? "that is stated"
-                     : judged.adequacy.noise_under_load ? "under load"
-                                                        : "at rest");
+  const Adequacy& a = judged.adequacy;
+  const std::string times = "residual " + times_text(a.residual_over_noise) + " times the noise ";
+  if (!judged.noise_was_stated) return times + (a.noise_under_load ? "under load" : "at rest");
+  return fmt::format("{}that is stated, p = {} is {} {} %", times, significant(a.p_value, 2),
+                     a.p_value < kLevel ? "below" : "not below", 100.0 * kLevel);
 }
 
 /// "this recording", or which of several.

@@ -25,15 +25,13 @@ std::string answer_head(double level) {
 }
 
 std::string parameter_row(const ParameterResult& p) {
-  constexpr double kNothing = 1e-4;  // of the size of the row
   const double size = size_of(p);
   const Unit unit = sized_unit(p.parameter.unit, size);
-  const double shown = std::abs(p.estimate) < kNothing * std::abs(size) ? 0.0 : p.estimate;
   const std::string interval =
       p.verdict == Verdict::not_profiled
           ? "-"
           : fmt::format("{} .. {}", limit_text(p, false, unit), limit_text(p, true, unit));
-  return answer_row(p.parameter.name, significant(shown / unit.to_si, 5), interval, unit.symbol,
+  return answer_row(p.parameter.name, estimate_text(p.estimate, size, unit), interval, unit.symbol,
                     verdict_text(p));
 }
 
@@ -279,10 +277,10 @@ void add_moduli(ShortAnswer& answer, const YoungModuli& moduli) {
     const Unit unit = plain ? sized_unit(shown_unit(Dimension::stress), m.estimate)
                             : Unit{"k" + m.unit, Dimension::dimensionless, kKilo};
     const auto limit = [&](const std::optional<double>& value) {
-      return value ? significant(*value / unit.to_si, 4) : std::string("open");
+      return value ? significant(*value / unit.to_si, kIntervalDigits) : std::string("open");
     };
     rows.push_back(
-        answer_row(m.name, significant(m.estimate / unit.to_si, 5),
+        answer_row(m.name, significant(m.estimate / unit.to_si, kEstimateDigits),
                    fmt::format("{} .. {}", limit(m.lower), limit(m.upper)), unit.symbol,
                    m.verdict.empty() ? "of " + m.of : fmt::format("of {}; {}", m.of, m.verdict)));
   }

@@ -26,10 +26,11 @@ std::string parameter_table(const FitResult& result) {
                   fmt::format("{:.4g} % interval", 100.0 * result.config.level), "unit", "verdict");
   for (const ParameterResult& p : result.parameters) {
     const Unit unit = sized_unit(p.parameter.unit, size_of(p));
-    text += fmt::format("{:<10} {:>12} {:>12}  {:<24} {:<8} {}\n", p.parameter.name,
-                        significant(p.estimate / unit.to_si, 5),
-                        p.standard_error ? significant(*p.standard_error / unit.to_si, 3) : "-",
-                        interval_text(p, unit), unit.symbol, verdict_text(p));
+    text += fmt::format(
+        "{:<10} {:>12} {:>12}  {:<24} {:<8} {}\n", p.parameter.name,
+        estimate_text(p.estimate, size_of(p), unit),
+        p.standard_error ? significant(*p.standard_error / unit.to_si, kErrorDigits) : "-",
+        interval_text(p, unit), unit.symbol, verdict_text(p));
   }
   return text;
 }
@@ -135,8 +136,8 @@ std::string bootstrap_table(const FitResult& result) {
                          significant(limits.upper / unit.to_si, 4));
     };
     text += fmt::format("  {:<10} std. error {}, percentile {}, BCa {} {}\n", p.name,
-                        significant(p.standard_error / unit.to_si, 3), interval(p.percentile),
-                        p.bca ? interval(*p.bca) : "-", unit.symbol);
+                        significant(p.standard_error / unit.to_si, kErrorDigits),
+                        interval(p.percentile), p.bca ? interval(*p.bca) : "-", unit.symbol);
   }
   return text + "\n";
 }
@@ -157,7 +158,10 @@ std::string to_terminal_text(const FitResult& result) {
                       result.band_count > 0 ? fmt::format(" and {} bands", result.band_count) : "",
                       result.degrees_of_freedom > 0 ? std::to_string(result.degrees_of_freedom)
                                                     : std::string("no"));
-  if (result.chi_square_p) text += fmt::format(", p = {}", significant(*result.chi_square_p, 2));
+  if (result.chi_square_p) {
+    text += fmt::format(", p = {}{}", significant(*result.chi_square_p, 2),
+                        result.recordings.empty() ? "" : " if all samples were independent");
+  }
   text += "\n" + noise_line(result);
   if (result.likelihood) text += likelihood_line(*result.likelihood);
   text += "\n";

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <optional>
 #include <vector>
 
 #include "tpm/base/sized_unit.hpp"
@@ -11,6 +12,7 @@
 #include "tpm/files/document_place.hpp"
 #include "tpm/files/file.hpp"
 #include "tpm/fit/likelihood/parameter.hpp"
+#include "tpm/fit/verdict.hpp"
 #include "tpm/show/view_parts.hpp"
 #include "tpmkit/error.hpp"
 #include "tpmkit/law_file.hpp"
@@ -19,8 +21,6 @@
 
 namespace tpm::fit {
 namespace {
-
-constexpr int kShownDigits = 6;
 
 /// A JSON array of numbers as an array of the page; null and what else is no number is left empty.
 std::string put_numbers(ViewPage& page, const Json& list) {
@@ -107,7 +107,6 @@ Json law_row(const LawFile& law, const LawParameter& parameter, std::size_t plac
   const auto shown = [&unit](double si, int digits) {
     return significant(si / unit.to_si, digits);
   };
-  constexpr int kErrorDigits = 3, kIntervalDigits = 4;
   std::string error = "fixed", interval = "-";
   const std::optional<LawUncertainty>& u = law.uncertainty;
   const auto at =
@@ -123,7 +122,7 @@ Json law_row(const LawFile& law, const LawParameter& parameter, std::size_t plac
     error = shown(std::abs(coordinate_slope(coordinate, value)) * sd, kErrorDigits);
     interval = fmt::format("{} .. {}", shown(low, kIntervalDigits), shown(high, kIntervalDigits));
   }
-  return Json{parameter.name, shown(value, kShownDigits), unit.symbol, error, interval};
+  return Json{parameter.name, shown(value, kEstimateDigits), unit.symbol, error, interval};
 }
 
 void add_law(ViewPage& page, const std::filesystem::path& file) {
@@ -164,11 +163,19 @@ void add_law(ViewPage& page, const std::filesystem::path& file) {
 
 std::string interval_text(const Json& interval, const Unit& unit) {
   const auto end = [&unit](const Json& v) {
-    return v.is_number() ? significant(v.get<double>() / unit.to_si, 4) : std::string("open");
+    return v.is_number() ? significant(v.get<double>() / unit.to_si, kIntervalDigits)
+                         : std::string("open");
   };
   return interval.is_array() && interval.size() == 2
              ? fmt::format("{} .. {}", end(interval[0]), end(interval[1]))
              : std::string("-");
+}
+
+/// A limit of a parameter, SI; none where it is open.
+std::optional<double> end_of(const Json& parameter, std::size_t which) {
+  const Json interval = parameter.value("interval_SI", Json());
+  if (!interval.is_array() || interval.size() != 2 || !interval[which].is_number()) return {};
+  return interval[which].get<double>();
 }
 
 /// The interval of a parameter; "-" where nothing was profiled, as in the text of tpm fit.
@@ -243,9 +250,10 @@ void add_answer(ViewPage& page, const Json& fit, const DocumentPlace& place) {
   const std::string interval_name = interval_name_of(fit, place);
   for (const Json& p : fit.at("parameters")) {
     const double estimate = p.at("estimate_SI").get<double>();
-    const Unit unit = read_unit(p.at("SI_unit").get<std::string>(), estimate);
-    rows.push_back({p.at("name"), significant(estimate / unit.to_si, kShownDigits),
-                    interval_of(p, unit), unit.symbol, p.value("verdict", "")});
+    const double size = size_of(estimate, end_of(p, 0), end_of(p, 1));
+    const Unit unit = read_unit(p.at("SI_unit").get<std::string>(), size);
+    rows.push_back({p.at("name"), estimate_text(estimate, size, unit), interval_of(p, unit),
+                    unit.symbol, p.value("verdict", "")});
     add_profile(page, p, unit, interval_name);
   }
   page.description["table"] = {
@@ -294,7 +302,7 @@ std::string compared_text(const Json& quantity, const char* key, int digits) {
 
 /// @param name of the recording
 Json compared_row(const std::string& name, const Json& quantity) {
-  constexpr int kValueDigits = 4, kErrorDigits = 3;
+  constexpr int kValueDigits = 4;
   std::string verdict = quantity.at("verdict").get<std::string>();
   std::ranges::replace(verdict, '_', ' ');
   const bool share = quantity.at("unit") == "1";

@@ -2,9 +2,13 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <cmath>
+#include <functional>
+#include <limits>
 
 #include "tpm/base/enum_names.hpp"
+#include "tpm/base/sized_unit.hpp"
 #include "tpm/base/text.hpp"
 #include "tpm/show/result_table.hpp"
 
@@ -213,6 +217,25 @@ std::string impact_text(const BoundaryStudy& study) {
   return text;
 }
 
+/// Up to which share of the linear boundary every impact comes to rest, whatever limits its rise.
+std::string rest_sentence(const BoundaryStudy& study) {
+  double restless = std::numeric_limits<double>::infinity(), all_rest = 0.0;
+  const auto rests = [](const ImpactPoint& p) {
+    return std::ranges::all_of(p.rests, std::identity{});
+  };
+  for (const ImpactPoint& p : study.impacts) {
+    if (!rests(p)) restless = std::min(restless, p.share);
+  }
+  for (const ImpactPoint& p : study.impacts) {
+    if (p.share < restless) all_rest = std::max(all_rest, p.share);
+  }
+  return fmt::format("impacts: up to {} of the stable stiffness every hand comes to rest{}",
+                     significant(all_rest, 3),
+                     std::isfinite(restless) ? fmt::format("; from {} on some go on to oscillate",
+                                                           significant(restless, 3))
+                                             : "");
+}
+
 std::string corner_text(const BoundaryStudy& study) {
   return "\nfriction that a device needs to be passive at 1 kHz with all of its maker's stiffness "
          "and "
@@ -311,6 +334,53 @@ std::string boundary_text(const BoundaryStudy& study) {
         study.shortest_exact[i].measured == 0.0 ? "any" : value(study.shortest_exact[i].measured));
   }
   return text + impact_text(study) + corner_text(study);
+}
+
+ShortAnswer short_answer(const BoundaryStudy& study) {
+  constexpr double kShownRate_Hz = 1000.0;
+  const double friction = study.plant.damping_N_s_per_m;
+  ShortAnswer answer;
+  answer.conclusion = {
+      "SIMULATED DEVICE: largest instantaneous stiffness of a contact, found by bisection",
+      fmt::format("theory holds: measured boundaries of passivity within {} %, of stability within "
+                  "{} %",
+                  significant(100.0 * worst_difference(study.passive), 3),
+                  significant(100.0 * worst_difference(study.stable), 3))};
+  answer.head = {fmt::format("at {} Hz with {} N s/m of friction, relaxation time {} ms:",
+                             significant(kShownRate_Hz, 4), significant(friction, 3),
+                             significant(1e3 * study.relaxation_time_s, 3)),
+                 fmt::format("{:>6} {:>13} {:>13}", "delay", "passive", "stable")};
+  for (const BoundaryPoint& p : study.passive) {
+    if (p.rate_Hz != kShownRate_Hz || p.damping_N_s_per_m != friction) continue;
+    const auto stable = std::ranges::find_if(study.stable, [&](const BoundaryPoint& s) {
+      return s.rate_Hz == p.rate_Hz && s.delay_periods == p.delay_periods;
+    });
+    const auto words = [](double v) {
+      return std::isfinite(v) ? sized_text(Dimension::stiffness, v, 4) : value(v);
+    };
+    answer.rows.push_back(fmt::format(
+        "{:>6} {:>13} {:>13}", significant(1e3 * p.delay_periods / p.rate_Hz, 3) + " ms",
+        words(p.measured), stable == study.stable.end() ? "-" : words(stable->measured)));
+  }
+  answer.limits.push_back(rest_sentence(study));
+  for (std::size_t i = 0; i < study.shortest.size(); ++i) {
+    const BoundaryPoint& euler = study.shortest[i];
+    if (euler.rate_Hz != kShownRate_Hz) continue;
+    const double exact = study.shortest_exact[i].measured;
+    answer.limits.push_back(fmt::format(
+        "forward Euler is passive at relaxation times above {} ms, the exact update at {}",
+        value(1e3 * euler.measured), exact == 0.0 ? "all" : value(1e3 * exact) + " ms and more"));
+  }
+  for (const DeviceCorner& corner : study.corners) {
+    if (!corner.assumed_friction_N_s_per_m) continue;
+    answer.warnings.push_back(fmt::format(
+        "{} at its maker's largest stiffness and damping needs {} N s/m of friction to be passive; "
+        "it has {} to {} (assumed)",
+        corner.device, significant(corner.needed_N_s_per_m, 3),
+        significant(corner.assumed_friction_N_s_per_m->first, 3),
+        significant(corner.assumed_friction_N_s_per_m->second, 3)));
+  }
+  return answer;
 }
 
 std::vector<Figure> boundary_figures(const BoundaryStudy& study) {

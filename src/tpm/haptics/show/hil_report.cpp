@@ -229,6 +229,7 @@ void add_plan(Document& d, const Json& plan) {
                           {number(c.at("verified_error"), 100.0, " %")},
                           {c.at("reason").get<std::string>()}});
   }
+  table.stacks = true;
   d.table(std::move(table));
 }
 
@@ -250,8 +251,10 @@ void add_fidelity(Document& d, const Verification& v) {
   }
   for (const Remark& remark : v.remarks) others.push_back({remark.text, Tone::bad});
   if (!others.empty()) d.bullets(std::move(others));
-  d.table(phase_table(v).page("Force error by phase; depth: how well the operator followed, rms",
-                              v.phases));
+  Table phases = phase_table(v).page(
+      "Force error by phase; depth: how well the operator followed, rms", v.phases);
+  phases.stacks = true;
+  d.table(std::move(phases));
 }
 
 void add_experiment(Document& d, const Verification& v) {
@@ -261,7 +264,9 @@ void add_experiment(Document& d, const Verification& v) {
       "Readings of pig liver (Samur et al. 2007, as printed) at the same depths, without "
       "error bars and with a rate that is not stated; the difference says how well the "
       "material of the session is chosen, not how well it is rendered.");
-  d.table(experiment_table(v).page("", v.experiment));
+  Table readings = experiment_table(v).page("", v.experiment);
+  readings.stacks = true;
+  d.table(std::move(readings));
 }
 
 void add_timing(Document& d, const HilRecording& r, const RecordingSummary& s) {

@@ -5,6 +5,7 @@
 #include <cmath>
 
 #include "tpm/base/lists.hpp"
+#include "tpm/base/sized_unit.hpp"
 #include "tpm/base/text.hpp"
 #include "tpm/sweep/show/sweep_report.hpp"
 
@@ -55,12 +56,14 @@ std::string verdict(const SweepConvergence& c) {
 }
 
 Figure convergence_figure(const SweepConvergence& c, const std::string& title) {
-  const Unit unit = shown_unit_of(c.unit), unit_size = shown_unit_of(c.size_unit);
+  const Unit unit = sized_unit(shown_unit_of(c.unit), c.value.back()),
+             unit_size = sized_unit(shown_unit_of(c.size_unit), c.size.front());
+  const std::string name = printed(c.variable), size_name = printed(c.size_text);
   const GridConvergence& finest = c.threes.back();
-  Figure figure{figure_id("convergence", c.variable), c.variable,
-                fmt::format("{}: {} over {}{}: {}.", title, c.variable, c.size_text,
+  Figure figure{figure_id("convergence", c.variable), name,
+                fmt::format("{}: {} over {}{}: {}.", title, name, size_name,
                             fixed_words(c.fixed, 5), verdict(c))};
-  const Axis size_axis{c.size_text, unit_size.symbol, true};
+  const Axis size_axis{size_name, unit_size.symbol, true};
   Series cells = line("model", {}, {});
   for (std::size_t i = 0; i < c.size.size(); ++i) {
     cells.add(c.size[i] / unit_size.to_si, c.value[i] / unit.to_si);
@@ -69,7 +72,7 @@ Figure convergence_figure(const SweepConvergence& c, const std::string& title) {
   dots.kind = Series::Kind::points;
   dots.label = "sizes";
   dots.provenance = "model";
-  Panel values{"", size_axis, {c.variable, unit.symbol}, {cells, std::move(dots)}};
+  Panel values{"", size_axis, {name, unit.symbol}, {cells, std::move(dots)}};
   if (!c.monotone()) {
     figure.panels.push_back(std::move(values));
     return figure;
@@ -87,11 +90,10 @@ Figure convergence_figure(const SweepConvergence& c, const std::string& title) {
     slope.add(c.size[i] / unit_size.to_si,
               last * std::pow(c.size[i] / c.size.back(), finest.order) / unit.to_si);
   }
-  Panel distances{
-      "",
-      size_axis,
-      {fmt::format("distance of {} from the extrapolated", c.variable), unit.symbol, true},
-      {std::move(away), std::move(slope)}};
+  Panel distances{"",
+                  size_axis,
+                  {fmt::format("distance of {} from the extrapolated", name), unit.symbol, true},
+                  {std::move(away), std::move(slope)}};
   figure.panels.push_back(std::move(distances));
   return figure;
 }
@@ -125,6 +127,24 @@ std::string convergence_text(const std::vector<SweepConvergence>& all) {
     text += verdict(c) + "\n";
   }
   return text;
+}
+
+ShortAnswer short_answer(const std::vector<SweepConvergence>& all, const std::string& title) {
+  ShortAnswer answer;
+  if (!title.empty()) answer.conclusion.push_back(title);
+  if (all.size() == 1) {
+    std::vector<std::string> lines = separate_lines(convergence_text(all));
+    answer.conclusion.push_back(std::move(lines.back()));  // the verdict
+    lines.pop_back();
+    answer.head.assign(lines.begin(), lines.begin() + 2);  // what over which axis, columns
+    answer.rows.assign(lines.begin() + 2, lines.end());
+    return answer;
+  }
+  for (const SweepConvergence& c : all) {
+    answer.rows.push_back(fmt::format("{} over {}{}: {}", c.variable, c.size_text,
+                                      fixed_words(c.fixed, 5), verdict(c)));
+  }
+  return answer;
 }
 
 Json convergence_json(const std::vector<SweepConvergence>& all) {

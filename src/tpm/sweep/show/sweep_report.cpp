@@ -7,6 +7,7 @@
 #include <limits>
 
 #include "tpm/base/quantity_text.hpp"
+#include "tpm/base/sized_unit.hpp"
 #include "tpm/base/text.hpp"
 #include "tpmkit/error.hpp"
 #include "tpmkit/units.hpp"
@@ -41,14 +42,57 @@ bool even_in_logarithm(const std::vector<double>& places) {
   return std::abs(first - last) < 1e-6 * first && std::abs(first - 1.0) > 1e-6;
 }
 
-Axis axis_of(const ReadAxis& axis) {
-  return {axis.name, shown_unit_of(axis.unit).symbol, even_in_logarithm(axis.places)};
+struct FoundRange {
+  double least = std::numeric_limits<double>::infinity();
+  double largest = -std::numeric_limits<double>::infinity();
+};
+
+FoundRange range_of(const SweepReader& sweep, const std::string& name) {
+  FoundRange range;
+  sweep.each({name, "status"}, [&](const auto& found) {
+    for (std::size_t i = 0; i < found[0].size(); ++i) {
+      if (found[1][i] != 0.0 || std::isnan(found[0][i])) continue;
+      range.least = std::min(range.least, found[0][i]);
+      range.largest = std::max(range.largest, found[0][i]);
+    }
+  });
+  return range;
+}
+
+/// The unit in which the largest of the values is read most easily.
+Unit unit_of(const std::string& si_unit, const std::vector<double>& values) {
+  double largest = 0.0;
+  for (const double v : values) {
+    if (std::isfinite(v)) largest = std::max(largest, std::abs(v));
+  }
+  return sized_unit(shown_unit_of(si_unit), largest);
+}
+
+/// The unit of all panels of a quantity.
+Unit unit_of(const SweepReader& sweep, const ReadVariable& v) {
+  if (!v.times_s.empty()) return unit_of(v.unit, sweep.curve(v.name, {}));
+  const FoundRange range = range_of(sweep, v.name);
+  return unit_of(v.unit, {range.least, range.largest});
+}
+
+/// "spacing x": a letter is told what it stands for; of a JSON pointer, its last key.
+std::string printed_parameter(const SweepReader& sweep, const std::string& name) {
+  const std::string target = sweep.parameter_target(name);
+  const std::string key = target.substr(target.find_last_of("/.") + 1);
+  return name.size() > 1 || key.size() < 2 ? printed(name)
+                                           : fmt::format("{} {}", printed(key), name);
+}
+
+Axis axis_of(const SweepReader& sweep, const ReadAxis& axis) {
+  const bool own = axis.parameters == std::vector{axis.name};
+  return {own ? printed_parameter(sweep, axis.name) : printed(axis.name),
+          unit_of(axis.unit, axis.places).symbol, even_in_logarithm(axis.places)};
 }
 
 /// Its own parameter's place, with the unit; else its number.
 std::string place_words(const ReadAxis& axis, std::uint64_t place) {
-  return fmt::format("{} = {}", axis.name,
-                     value_words(axis.places[place], shown_unit_of(axis.unit), 4));
+  return fmt::format("{} = {}", printed(axis.name),
+                     value_words(axis.places[place], unit_of(axis.unit, axis.places), 4));
 }
 
 std::string slice_words(const SweepReader& sweep, const std::vector<std::string>& free,
@@ -94,16 +138,15 @@ void add_lines(const std::string& label, const std::vector<double>& x, const std
   finish();
 }
 
-Panel sweep_map(const SweepReader& sweep, const ReadVariable& v, const std::string& x,
-                const std::string& y, const FixedPlaces& fixed) {
+Panel sweep_map(const SweepReader& sweep, const ReadVariable& v, const Unit& unit,
+                const std::string& x, const std::string& y, const FixedPlaces& fixed) {
   const ReadAxis& across = sweep.axes()[sweep.axis(x)];
   const ReadAxis& up = sweep.axes()[sweep.axis(y)];
   const std::vector<double> all = sweep.slice(v.name, y, x, fixed);
   const auto columns = some_of(across.places.size(), kMostPlaces);
   const auto rows = some_of(up.places.size(), kMostPlaces);
-  const Unit unit = shown_unit_of(v.unit), unit_x = shown_unit_of(across.unit),
-             unit_y = shown_unit_of(up.unit);
-  Series heat{.kind = Series::Kind::heat, .label = v.name, .provenance = "model"};
+  const Unit unit_x = unit_of(across.unit, across.places), unit_y = unit_of(up.unit, up.places);
+  Series heat{.kind = Series::Kind::heat, .label = printed(v.name), .provenance = "model"};
   for (const std::size_t c : columns) heat.x.push_back(across.places[c] / unit_x.to_si);
   for (const std::size_t r : rows) {
     heat.y.push_back(up.places[r] / unit_y.to_si);
@@ -111,17 +154,22 @@ Panel sweep_map(const SweepReader& sweep, const ReadVariable& v, const std::stri
       heat.z.push_back(all[r * across.places.size() + c] / unit.to_si);
     }
   }
-  return {named_in_unit(v.name, unit), axis_of(across), axis_of(up), {std::move(heat)}};
+  return {named_in_unit(printed(v.name), unit),
+          axis_of(sweep, across),
+          axis_of(sweep, up),
+          {std::move(heat)}};
 }
 
-Panel sweep_family(const SweepReader& sweep, const ReadVariable& v, const std::string& x,
-                   const std::optional<std::string>& of, const FixedPlaces& fixed) {
+Panel sweep_family(const SweepReader& sweep, const ReadVariable& v, const Unit& unit,
+                   const std::string& x, const std::optional<std::string>& of,
+                   const FixedPlaces& fixed) {
   const ReadAxis& across = sweep.axes()[sweep.axis(x)];
-  const Unit unit = shown_unit_of(v.unit);
-  Panel panel{named_in_unit(v.name, unit), axis_of(across), {v.name, unit.symbol}};
-  const std::vector<double> places = in_shown_unit(across.places, shown_unit_of(across.unit));
+  const std::string name = printed(v.name);
+  Panel panel{named_in_unit(name, unit), axis_of(sweep, across), {name, unit.symbol}};
+  const std::vector<double> places =
+      in_shown_unit(across.places, unit_of(across.unit, across.places));
   if (!of) {
-    add_lines(v.name, places, in_shown_unit(sweep.slice(v.name, {}, x, fixed), unit), panel.series);
+    add_lines(name, places, in_shown_unit(sweep.slice(v.name, {}, x, fixed), unit), panel.series);
     return panel;
   }
   const ReadAxis& other = sweep.axes()[sweep.axis(*of)];
@@ -134,11 +182,11 @@ Panel sweep_family(const SweepReader& sweep, const ReadVariable& v, const std::s
   return panel;
 }
 
-Panel sweep_curves(const SweepReader& sweep, const ReadVariable& v, const std::string& of,
-                   const FixedPlaces& fixed) {
+Panel sweep_curves(const SweepReader& sweep, const ReadVariable& v, const Unit& unit,
+                   const std::string& of, const FixedPlaces& fixed) {
   const ReadAxis& axis = sweep.axes()[sweep.axis(of)];
-  const Unit unit = shown_unit_of(v.unit);
-  Panel panel{v.name, {"time", "s", even_in_logarithm(v.times_s)}, {v.name, unit.symbol}};
+  const std::string quantity = printed(v.name);
+  Panel panel{quantity, {"time", "s", even_in_logarithm(v.times_s)}, {quantity, unit.symbol}};
   for (const std::size_t place : some_of(axis.places.size(), kLines)) {
     FixedPlaces here = fixed;
     here.emplace_back(of, place);
@@ -158,23 +206,24 @@ bool sampled_in_logarithm(const SweepReader& sweep, const ReadAxis& axis, const 
 }
 
 /// A number over each parameter of an axis of samples.
-std::vector<Panel> sweep_clouds(const SweepReader& sweep, const ReadVariable& v,
+std::vector<Panel> sweep_clouds(const SweepReader& sweep, const ReadVariable& v, const Unit& unit,
                                 const ReadAxis& axis, const FixedPlaces& fixed) {
-  const Unit unit = shown_unit_of(v.unit);
+  const std::string quantity = printed(v.name);
   const auto found = in_shown_unit(sweep.slice(v.name, {}, axis.name, fixed), unit);
   const auto chosen = some_of(found.size(), kMostPoints);
   std::vector<Panel> panels;
   for (const std::string& name : axis.parameters) {
     const std::vector<double> values = sweep.parameter(name);
-    const Unit unit_x = shown_unit_of(sweep.parameter_unit(name));
-    Series cloud{.kind = Series::Kind::points, .label = v.name, .provenance = "model"};
+    const Unit unit_x = unit_of(sweep.parameter_unit(name), values);
+    Series cloud{.kind = Series::Kind::points, .label = quantity, .provenance = "model"};
     for (const std::size_t i : chosen) {
       if (!std::isfinite(found[i])) continue;
       cloud.add(values[i] / unit_x.to_si, found[i]);
     }
-    panels.push_back({name,
-                      {name, unit_x.symbol, sampled_in_logarithm(sweep, axis, name)},
-                      {v.name, unit.symbol}});
+    panels.push_back(
+        {printed(name),
+         {printed_parameter(sweep, name), unit_x.symbol, sampled_in_logarithm(sweep, axis, name)},
+         {quantity, unit.symbol}});
     if (!cloud.x.empty()) panels.back().series.push_back(std::move(cloud));
   }
   return panels;
@@ -194,18 +243,19 @@ Figure sweep_figure(const SweepReader& sweep, const ReadVariable& v, const Sweep
   for (std::size_t a = axes.size(); a-- > 0 && !y;) {
     if (axes[a].name != x && !is_fixed(axes[a].name)) y = axes[a].name;
   }
-  Figure figure{v.name, v.name, fmt::format("{}: {}.", sweep.title(), v.meaning)};
+  const Unit unit = unit_of(sweep, v);
+  Figure figure{v.name, printed(v.name), fmt::format("{}: {}.", sweep.title(), v.meaning)};
   std::vector<std::string> free{x};
   if (!v.times_s.empty()) {
-    figure.panels.push_back(sweep_curves(sweep, v, x, wished.fixed));
+    figure.panels.push_back(sweep_curves(sweep, v, unit, x, wished.fixed));
   } else if (across.parameters != std::vector{across.name}) {
-    figure.panels = sweep_clouds(sweep, v, across, wished.fixed);
+    figure.panels = sweep_clouds(sweep, v, unit, across, wished.fixed);
   } else {
     if (y) {
       free.push_back(*y);
-      figure.panels.push_back(sweep_map(sweep, v, x, *y, wished.fixed));
+      figure.panels.push_back(sweep_map(sweep, v, unit, x, *y, wished.fixed));
     }
-    figure.panels.push_back(sweep_family(sweep, v, x, y, wished.fixed));
+    figure.panels.push_back(sweep_family(sweep, v, unit, x, y, wished.fixed));
   }
   if (!v.times_s.empty() || across.parameters != std::vector{across.name}) free = {x};
   refuse_free(free, wished.fixed, v.name);
@@ -221,8 +271,8 @@ Figure pareto_figure(const SweepReader& sweep, const std::string& first,
   Series cloud{.kind = Series::Kind::points, .label = "cells", .provenance = "model"};
   const std::uint64_t stride = sweep.cells() / kMostPoints + 1;
   std::uint64_t cell = 0;
-  const Unit unit_x = shown_unit_of(sweep.variable(second).unit),
-             unit_y = shown_unit_of(sweep.variable(first).unit);
+  const Unit unit_x = unit_of(sweep, sweep.variable(second)),
+             unit_y = unit_of(sweep, sweep.variable(first));
   sweep.each({second, first, "status"}, [&](const auto& found) {
     for (std::size_t i = 0; i < found[0].size(); ++i, ++cell) {
       if (found[2][i] != 0.0) continue;
@@ -237,7 +287,7 @@ Figure pareto_figure(const SweepReader& sweep, const std::string& first,
   for (const auto& [x, y] : front) {
     best.add(x / unit_x.to_si, y / unit_y.to_si);
   }
-  Panel panel{"", {second, unit_x.symbol}, {first, unit_y.symbol}};
+  Panel panel{"", {printed(second), unit_x.symbol}, {printed(first), unit_y.symbol}};
   if (!cloud.x.empty()) panel.series.push_back(std::move(cloud));
   Series ends = best;
   ends.kind = Series::Kind::points;
@@ -245,29 +295,17 @@ Figure pareto_figure(const SweepReader& sweep, const std::string& first,
   panel.series.push_back(std::move(best));
   panel.series.push_back(std::move(ends));
   return {"pareto",
-          fmt::format("{} against {}", first, second),
+          fmt::format("{} against {}", printed(first), printed(second)),
           fmt::format("{} cells that no other betters in both.", front.size()),
           {std::move(panel)}};
 }
 
-struct FoundRange {
-  double least = std::numeric_limits<double>::infinity();
-  double largest = -std::numeric_limits<double>::infinity();
-};
-
-FoundRange range_of(const SweepReader& sweep, const std::string& name) {
-  FoundRange range;
-  sweep.each({name, "status"}, [&](const auto& found) {
-    for (std::size_t i = 0; i < found[0].size(); ++i) {
-      if (found[1][i] != 0.0 || std::isnan(found[0][i])) continue;
-      range.least = std::min(range.least, found[0][i]);
-      range.largest = std::max(range.largest, found[0][i]);
-    }
-  });
-  return range;
-}
-
 }  // namespace
+
+std::string printed(std::string name) {
+  std::ranges::replace(name, '_', ' ');
+  return name;
+}
 
 std::string named_in_unit(const std::string& name, const Unit& unit) {
   return unit.symbol.empty() ? name : fmt::format("{} [{}]", name, unit.symbol);

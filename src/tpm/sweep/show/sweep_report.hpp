@@ -5,6 +5,7 @@
 
 #include "tpm/base/namespaces.hpp"
 #include "tpm/show/figure.hpp"
+#include "tpm/show/short_answer.hpp"
 #include "tpm/sweep/sweep_sensitivity.hpp"
 #include "tpmkit/units.hpp"
 
@@ -12,6 +13,8 @@ namespace tpm::sweep {
 
 /// The unit in which people read numbers of an SI unit; empty for plain numbers.
 [[nodiscard]] Unit shown_unit_of(const std::string& si_unit);
+/// "peak force": the name of a quantity or a parameter as figures print it.
+[[nodiscard]] std::string printed(std::string name);
 /// "depth [mm]"
 [[nodiscard]] std::string named_in_unit(const std::string& name, const Unit& unit);
 
@@ -28,6 +31,9 @@ namespace tpm::sweep {
 
 /// First-order and total indices with their intervals, one table for each number.
 [[nodiscard]] std::string sensitivity_text(const std::vector<SweepSensitivity>& all);
+/// A row for each number: its spread, and the parameters that make it, by falling total index.
+[[nodiscard]] ShortAnswer short_answer(const std::vector<SweepSensitivity>& all,
+                                       const std::string& title);
 [[nodiscard]] Json sensitivity_json(const std::vector<SweepSensitivity>& all);
 
 /// For each number its first-order and total indices, by parameter, with their intervals.
