@@ -12,6 +12,7 @@
 #include "tpm/files/import/recording_file.hpp"
 #include "tpm/fit/fitted_law.hpp"
 #include "tpm/fit/online/identification.hpp"
+#include "tpm/fit/predict/error_budget.hpp"
 #include "tpm/fit/predict/law_prediction.hpp"
 #include "tpm/fit/select/fit_adequacy.hpp"
 #include "tpm/fit/select/selection.hpp"
@@ -196,6 +197,7 @@ TEST_CASE("Predictions and comparisons name a load that the window of a reading 
       CHECK((q.remark && q.remark->code == code) == remembered);
       if (remembered) CHECK(q.unknown);
     }
+    CHECK(test::has_remark(contact_budget(law, cut, {}).remarks, code) == remembered);
     IdentifyOptions options;
     options.laws = {law.spec};
     CHECK(test::has_remark(identify(cut, options).remarks, code) == remembered);
@@ -233,4 +235,36 @@ TEST_CASE("Cycles without a hold are told as such") {
   const Selection s = fitted(conditioned(false), std::nullopt);
   CHECK(test::has_remark(s.remarks, "no_hold"));
   CHECK_FALSE(test::has_remark(s.remarks, "hold_not_fitted"));
+}
+
+TEST_CASE("The first line names an unloading that the law of the hold does not describe") {
+  constexpr double kUnload_s = 15.0, kLost = 0.8;  // of the force, where the probe goes back
+  for (const bool lost : {false, true}) {
+    CAPTURE(lost);
+    Recording r;
+    for (int i = 0; 0.05 * i < 19.0; ++i) {
+      const double t = 0.05 * i;
+      r.time_s.push_back(t);
+      r.drive.push_back(std::clamp(4e-3 * (t - 3.0), 0.0, 4e-3) -
+                        std::clamp(1e-3 * (t - kUnload_s), 0.0, 3e-3));
+    }
+    const Eigen::VectorXd f =
+        LawModel(parse_law_name("linear-1", "test"))
+            .respond(measured_history(Drive::displacement, r.time_s, r.drive), r.time_s,
+                     std::vector<double>{100.0, 40.0, 0.7, 0.0, 0.0}, Want::values)
+            .value;
+    Random random(7);
+    for (std::size_t i = 0; i < r.time_s.size(); ++i) {
+      const double share = lost && r.time_s[i] > kUnload_s ? kLost : 1.0;
+      r.response.push_back(share * f[static_cast<Eigen::Index>(i)] + 3e-4 * random.normal());
+    }
+    const Selection s = fitted(r, std::nullopt);
+    const std::optional<LawAdequacy>& adequacy = s.candidates[s.recommended].fit.adequacy;
+    REQUIRE(adequacy);
+    CAPTURE(adequacy->summary);
+    CHECK(adequacy->is_adequate());  // of what was fitted
+    CHECK_THAT(adequacy->summary, Contains("the law describes this recording"));
+    CHECK((adequacy->summary.find("; not the unloading and what follows: off by ") !=
+           std::string::npos) == lost);
+  }
 }

@@ -13,6 +13,8 @@
 
 namespace tpm::fit {
 
+struct RoundedLevels;
+
 /// The residuals of a configuration: experiments asked of the model, compared with data.
 class ExperimentResiduals final : public ResidualFunction {
  public:
@@ -118,8 +120,9 @@ class ExperimentResiduals final : public ResidualFunction {
   /// Error of a level in its standard deviations, by recording and level, and whether it is held.
   using LevelError = std::function<double(std::size_t, std::size_t, bool)>;
   /// A copy with rounding errors of the drives; null if no drive was rounded, or all errors are 0.
+  /// @param found levels of the recordings' drives in their order; if empty they are determined
   [[nodiscard]] std::unique_ptr<ExperimentResiduals> with_other_rounding(
-      const LevelError& error_of) const;
+      std::vector<RoundedLevels>& found, const LevelError& error_of) const;
   /// A copy with that noise in every `every`-th sample from `first` on; null if there is none.
   [[nodiscard]] std::unique_ptr<ExperimentResiduals> with_noisier_drives(std::size_t first,
                                                                          std::size_t every) const;

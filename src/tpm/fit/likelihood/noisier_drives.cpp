@@ -69,12 +69,15 @@ std::unique_ptr<ExperimentResiduals> ExperimentResiduals::with_noisier_drives(
 }
 
 std::unique_ptr<ExperimentResiduals> ExperimentResiduals::with_other_rounding(
-    const LevelError& error_of) const {
+    std::vector<RoundedLevels>& found, const LevelError& error_of) const {
   std::size_t recording = 0;
   return with_moved_drives([&](const Experiment&, std::vector<Knot>& knots) {
-    std::vector<double> values;
-    for (const Knot& knot : knots) values.push_back(knot.value);
-    const RoundedLevels rounded = rounded_levels(values);
+    if (recording == found.size()) {
+      std::vector<double> values;
+      for (const Knot& knot : knots) values.push_back(knot.value);
+      found.push_back(rounded_levels(values));
+    }
+    const RoundedLevels& rounded = found[recording];
     bool moved = false;
     for (std::size_t l = 0; l < rounded.levels.size(); ++l) {
       const RoundedLevel& level = rounded.levels[l];
@@ -95,26 +98,30 @@ std::vector<Eigen::VectorXd> ExperimentResiduals::drive_rounding_slopes(
   std::vector<std::pair<std::size_t, std::size_t>> holds;
   Random random(kRoundingSeed);  // the same signs in every draw
   std::map<std::pair<std::size_t, std::size_t>, std::size_t> passed;
-  const auto listed = with_other_rounding([&](std::size_t recording, std::size_t level, bool held) {
-    if (held) holds.emplace_back(recording, level);
-    if (!held)
-      passed.emplace(std::pair{recording, level},
-                     random.below(2) * kDraws + passed.size() % kDraws);
-    return held ? 0.0 : 1.0;
-  });
+  std::vector<RoundedLevels> found;
+  const auto listed =
+      with_other_rounding(found, [&](std::size_t recording, std::size_t level, bool held) {
+        if (held) holds.emplace_back(recording, level);
+        if (!held)
+          passed.emplace(std::pair{recording, level},
+                         random.below(2) * kDraws + passed.size() % kDraws);
+        return held ? 0.0 : 1.0;
+      });
   for (const auto& hold : holds) {
-    others.push_back(with_other_rounding([&](std::size_t recording, std::size_t level, bool) {
-      return hold == std::pair{recording, level} ? 1.0 : 0.0;
-    }));
+    others.push_back(
+        with_other_rounding(found, [&](std::size_t recording, std::size_t level, bool) {
+          return hold == std::pair{recording, level} ? 1.0 : 0.0;
+        }));
   }
   for (std::size_t draw = 0; listed && draw < kDraws; ++draw) {
-    others.push_back(with_other_rounding([&](std::size_t recording, std::size_t level, bool held) {
-      if (held) return 0.0;
-      // Rows of a Hadamard matrix, by turns: draws of eight levels are uncorrelated.
-      const std::size_t row = passed.at({recording, level});
-      const bool up = std::popcount(draw & (row % kDraws)) % 2 == (row < kDraws ? 0 : 1);
-      return (up ? 1.0 : -1.0) / std::sqrt(static_cast<double>(kDraws));
-    }));
+    others.push_back(
+        with_other_rounding(found, [&](std::size_t recording, std::size_t level, bool held) {
+          if (held) return 0.0;
+          // Rows of a Hadamard matrix, by turns: draws of eight levels are uncorrelated.
+          const std::size_t row = passed.at({recording, level});
+          const bool up = std::popcount(draw & (row % kDraws)) % 2 == (row < kDraws ? 0 : 1);
+          return (up ? 1.0 : -1.0) / std::sqrt(static_cast<double>(kDraws));
+        }));
   }
   Eigen::VectorXd before, after;
   RowMatrix slopes;

@@ -21,6 +21,7 @@
 #include "tpm/fit/select/history_before_window.hpp"
 #include "tpm/fit/select/law_choice.hpp"
 #include "tpm/fit/select/reading_scatter.hpp"
+#include "tpm/fit/select/selection.hpp"
 #include "tpm/fit/select/unloading_test.hpp"
 #include "tpm/fit/select/untold_noise.hpp"
 #include "tpm/fit/spikes_at_rest.hpp"
@@ -169,9 +170,8 @@ std::optional<Judged> worst_of(const FitResult& fit, std::span<const RestedRecor
       one.adequacy.causes.push_back(
           {"drift_not_linear", "a drift of the zero that is not linear (a warm-up)"});
     } else if (!one.drift_off.empty()) {
-      Adequacy& a = one.adequacy;
-      a.described = Described::not_described;
-      a.causes.push_back(
+      one.adequacy.described = Described::not_described;
+      one.adequacy.causes.push_back(
           {"slow_branch", "a slow branch that the law does not have, or a drift that changes"});
     }
     if (!worst || rank(one) > rank(*worst)) worst = std::move(one);
@@ -186,7 +186,6 @@ std::size_t told_at_rest(const Recording& recording, const RecordingPhases& phas
 
 std::vector<RestedRecording> rested(std::span<const PreparedRecording> recordings) {
   std::vector<RestedRecording> list;
-  list.reserve(recordings.size());
   for (const PreparedRecording& r : recordings) {
     list.push_back({&r.recording, told_at_rest(r.recording, r.phases)});
   }
@@ -267,7 +266,8 @@ LawAdequacy stated(const FitResult& fit, const Judged& judged, std::size_t tried
   if (a.noise_sd > 0.0) result.residual_over_noise = a.residual_over_noise;
   if (a.described == Described::adequate) {
     result.summary =
-        fmt::format("the law describes {}: {}", subject(fit, judged), times_the_noise(judged));
+        fmt::format("the law describes {}: {}{}", subject(fit, judged), times_the_noise(judged),
+                    judged.noise_was_stated ? "" : not_after_fit(fit));
     return result;
   }
   const std::string law = fit.config.law ? law_name(*fit.config.law) : "the model";
@@ -433,9 +433,9 @@ std::size_t samples_at_rest(const RecordingPhases& phases) {
 void state_adequacy(FitResult& fit, std::span<const PreparedRecording> recordings,
                     std::size_t fits) {
   doubt_placement(fit, recordings);
-  const std::vector<RestedRecording> rests = rested(recordings);
-  const auto worst = worst_of(fit, rests, fits);
-  if (worst) state(fit, stated(fit, *worst, 1, {}));
+  if (const auto worst = worst_of(fit, rested(recordings), fits)) {
+    state(fit, stated(fit, *worst, 1, {}));
+  }
 }
 
 void state_preferred(Selection& s) {

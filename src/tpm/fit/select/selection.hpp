@@ -142,6 +142,11 @@ void rank_candidates(Selection& s, bool few_readings = false);
 /// are none.
 [[nodiscard]] std::vector<Remark> outside_remarks(const FitResult& fit);
 
+/// "; not the unloading and what follows: off by 95 times that residual", to be appended to a
+/// verdict on the fitted part: of the recording whose samples after that part lie farthest from the
+/// prediction, where their rms exceeds three residuals. Empty if there is none.
+[[nodiscard]] std::string not_after_fit(const FitResult& fit);
+
 /// Fewer samples over a relaxation time than these cannot support it.
 inline constexpr int kLeastSamples = 3;
 

@@ -16,6 +16,9 @@
 namespace tpm::fit {
 namespace {
 
+constexpr double kDescribesAfterFit = 3.0;  // times the residual inside the window
+constexpr std::size_t kFewestOutside = 5;
+
 /// The samples after the fitted part, and those of them that the law predicts.
 struct Outside {
   double last_fitted_s = 0.0;
@@ -171,9 +174,26 @@ std::string later_hold_words(const PreparedRecording& r, const LaterHold& hold,
 
 }  // namespace
 
+std::string not_after_fit(const FitResult& fit) {
+  double worst = kDescribesAfterFit;
+  std::string words;
+  for (const RecordingFit& r : fit.recordings) {
+    const Outside o = outside_of(r);
+    if (o.predicted < kFewestOutside || !(r.rms_residual > 0.0)) continue;
+    if (ends_before_gap(r, o.last_fitted_s)) continue;
+    const double rms = std::sqrt(o.sum_of_squares / static_cast<double>(o.predicted));
+    if (!(rms > worst * r.rms_residual)) continue;
+    worst = rms / r.rms_residual;
+    words = fmt::format("; not the unloading and what follows{}: off by {} times that residual",
+                        fit.recordings.size() == 1
+                            ? ""
+                            : fmt::format(" in '{}'", fit.config.data[r.choice].dataset),
+                        significant(worst, 2));
+  }
+  return words;
+}
+
 std::vector<Remark> outside_remarks(const FitResult& fit) {
-  constexpr double kDescribes = 3.0;  // times the residual inside the window
-  constexpr std::size_t kFewestOutside = 5;
   constexpr double kMostly = 0.5;  // of the squares
   std::vector<Remark> remarks;
   for (const RecordingFit& r : fit.recordings) {
@@ -188,7 +208,7 @@ std::vector<Remark> outside_remarks(const FitResult& fit) {
                        significant(o.last_fitted_s, 4))});
     } else if (o.predicted > 0) {
       const double rms = std::sqrt(o.sum_of_squares / static_cast<double>(o.predicted));
-      const bool describes = rms <= kDescribes * r.rms_residual;
+      const bool describes = rms <= kDescribesAfterFit * r.rms_residual;
       remarks.push_back(
           {describes ? "predicted_after_fit" : "not_described_after_fit",
            fmt::format(
