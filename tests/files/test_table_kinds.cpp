@@ -213,8 +213,16 @@ TEST_CASE("columns that already mean something are not offered as the missing on
   const TableReader read;
   const std::string rows = "0,1,2\n1,2,3\n2,3,4\n3,4,5\n";
   const std::string tonometer = read.refusal("Time (s),Pressure (mmHg),Weight\n" + rows);
-  CHECK_THAT(tonometer, Contains("--response with one of column 2 'Pressure"));
+  CHECK_THAT(tonometer, Contains("--response with one of column 3 'Weight'"));
   CHECK_THAT(tonometer, !Contains("'Time'"));
+  // Nor those of another quantity, by their unit or their word.
+  CHECK_THAT(
+      read.refusal("Time (s),Angle (deg),Torque (mN m)\n" + rows),
+      Contains("a column of it with its unit, such as Force (N)") && !Contains("--response"));
+  CHECK_THAT(read.refusal("Time (s),Pressure (Pa),Aspirated length (um)\n" + rows),
+             !Contains("--response"));
+  CHECK_THAT(read.refusal("Sweep,Angle (deg),Force (N)\n" + rows),
+             Contains("--time or --drive with one of column 1 'Sweep'") && !Contains("'Angle'"));
   CHECK_THAT(read.refusal("Time (s),Depth (mm)\n0,1\n1,2\n2,3\n"),
              Contains("a column of it with its unit, such as Force (N)"));
   CHECK_THAT(read.refusal("Minute,Force (N)\n0,1\n1,2\n2,3\n"),

@@ -325,3 +325,23 @@ TEST_CASE("Creep under a load that was on before the recording is refused", "[bo
   // A force that follows the depth is no kept load.
   CHECK_NOTHROW(weight(1e-4, true));
 }
+
+TEST_CASE("a step that ends on a bound does not pass it by its rounding") {
+  Random random(5);
+  int at_bound = 0;
+  for (int i = 0; i < 1000; ++i) {
+    const double k = std::exp(random.normal()), tau = std::exp(random.normal());
+    const std::vector<FitParameter> both{
+        {"k1", parse_unit("N/m", "test"), Scale::linear, k, 0.0, 3.0 * k},
+        {"tau1", parse_unit("s", "test"), Scale::log, tau, 0.3 * tau, 1.7 * tau}};
+    const std::vector<double> start{k, tau};
+    const Eigen::Vector2d by(-4.0 * k * random.uniform(), 6.0 * tau * (random.uniform() - 0.5));
+    const std::vector<double> moved = moved_within_bounds(both, {0, 1}, start, by);
+    for (std::size_t j = 0; j < both.size(); ++j) {
+      CHECK(moved[j] >= both[j].lower);
+      CHECK(moved[j] <= both[j].upper);
+      at_bound += moved[j] == both[j].lower || moved[j] == both[j].upper ? 1 : 0;
+    }
+  }
+  CHECK(at_bound > 100);
+}

@@ -11,6 +11,7 @@
 #include "tpm/base/namespaces.hpp"
 #include "tpm/base/nearest_word.hpp"
 #include "tpm/files/clock_text.hpp"
+#include "tpm/files/import/refused_words.hpp"
 #include "tpmkit/error.hpp"
 
 namespace tpm::files {
@@ -80,13 +81,23 @@ void ColumnChoice::count_specimens() {
   }
 }
 
-std::string ColumnChoice::list(std::initializer_list<const MachineColumn*> without) const {
-  std::string list;
+std::string ColumnChoice::list() const {
+  const auto labels = mapped<std::string>(header_.columns, &MachineColumn::label);
+  return printable(fmt::format("{}", fmt::join(labels, ", ")), 200);
+}
+
+std::string ColumnChoice::list_of(std::initializer_list<Dimension> may_be,
+                                  std::initializer_list<const MachineColumn*> without) const {
+  std::vector<std::string> labels;
   for (const MachineColumn& column : header_.columns) {
     if (std::ranges::find(without, &column) != without.end()) continue;
-    list += fmt::format("{}{}", list.empty() ? "" : ", ", column.label());
+    if (names_another_quantity(title_words(column.title))) continue;
+    const bool known = is_unit(column.unit);
+    const auto fits = [&column](Dimension d) { return parse_unit(column.unit, {}).dimension == d; };
+    if (known && std::ranges::none_of(may_be, fits)) continue;
+    labels.push_back(column.label());
   }
-  return printable(list, 200);
+  return printable(fmt::format("{}", fmt::join(labels, ", ")), 200);
 }
 
 const MachineColumn& ColumnChoice::by_selector(const std::string& selector) const {

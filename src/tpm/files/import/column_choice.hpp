@@ -43,8 +43,14 @@ class ColumnChoice {
   void require_column_for_unit(const std::string& selector) const;
 
   /// "column 1 'Time', column 2 'Force'"
+  [[nodiscard]] std::string list() const;
+
+  /// Those that an option may take for what is missing: none of another quantity or dimension.
+  /// Empty if there is none.
   /// @param without left out, null or not
-  [[nodiscard]] std::string list(std::initializer_list<const MachineColumn*> without = {}) const;
+  /// @param may_be  dimensions of what is missing; a column without a known unit may be any
+  [[nodiscard]] std::string list_of(std::initializer_list<Dimension> may_be,
+                                    std::initializer_list<const MachineColumn*> without) const;
 
   /// Number of specimens side by side, 1 or more.
   [[nodiscard]] std::size_t specimens() const noexcept { return specimens_; }

@@ -406,16 +406,14 @@ std::optional<Recognized> recognize_words(const std::vector<std::string>& words)
   return found;
 }
 
-/// The words of a title. Where none is known, capitals inside them begin new ones: "BaseDisp" but
-/// not "zSensor" or "vDeflection", which are known as they stand.
+}  // namespace
+
 std::vector<std::string> title_words(std::string_view name) {
   std::vector<std::string> words = words_of(spelled_out(name));
   if (recognize_words(words)) return words;
   std::vector<std::string> parts = words_of(spelled_out(parted_at_capitals(name)));
   return recognize_words(parts) ? parts : words;
 }
-
-}  // namespace
 
 bool is_dimension_of(const Recognized& meaning, Dimension dimension) {
   const auto is_one_of = [dimension](std::initializer_list<Dimension> known) {

@@ -2,6 +2,7 @@
 #include <optional>
 #include <string>
 #include <string_view>
+#include <vector>
 
 #include "tpmkit/curve.hpp"
 #include "tpmkit/units.hpp"
@@ -40,6 +41,10 @@ struct RefusedTitle {
   std::string why;     ///< "'command' is what was asked for, not what was measured"
   bool asked = false;  ///< the quantity as it was asked for, and not another one
 };
+
+/// The words of a title, in small letters. Where none is known, capitals inside them begin new
+/// ones: "BaseDisp" but not "zSensor" or "vDeflection", which are known as they stand.
+[[nodiscard]] std::vector<std::string> title_words(std::string_view name);
 
 /// None for a title that recognize_title recognises, and for one without any known word.
 [[nodiscard]] std::optional<RefusedTitle> refused_title(std::string_view name);

@@ -260,11 +260,15 @@ std::vector<Use> spectrum_uses(const ColumnChoice& choice, const std::string& fi
             {magnitude, spectrum_quantity(*magnitude, false), Bound::value, false},
             second};
   }
-  for (const auto& [column, words, option] : {std::tuple{frequency, "a frequency", "--frequency"},
-                                              std::tuple{storage, "a storage modulus", "--storage"},
-                                              std::tuple{loss, "a loss modulus", "--loss"}}) {
+  using Dimensions = std::initializer_list<Dimension>;
+  const Dimensions rates = {Dimension::frequency};
+  const Dimensions parts = {Dimension::stress, Dimension::compliance, Dimension::viscosity};
+  for (const auto& [column, words, option, may_be] :
+       {std::tuple{frequency, "a frequency", "--frequency", rates},
+        std::tuple{storage, "a storage modulus", "--storage", parts},
+        std::tuple{loss, "a loss modulus", "--loss", parts}}) {
     if (column != nullptr) continue;
-    const std::string others = choice.list({frequency, storage, loss});
+    const std::string others = choice.list_of(may_be, {frequency, storage, loss});
     throw bad_input(file, fmt::format("no column is recognised as {}", words),
                     others.empty()
                         ? fmt::format("{} with a column of it: a law is fitted to storage and loss "
@@ -382,7 +386,9 @@ std::vector<Use> recording_uses(const MachineHeader& header, const ColumnChoice&
           "--unit 2=mm --unit 3=N, if they are these");
     }
     require_more_than_ratio(header, file);
-    const std::string others = choice.list({time, drive});
+    const std::string others = choice.list_of(
+        {Dimension::force, Dimension::stress, Dimension::compliance, Dimension::dimensionless},
+        {time, drive});
     throw bad_input(file, "no column is recognised as a force, stress, modulus or compliance",
                     others.empty() ? std::string("a column of it with its unit, such as Force (N)")
                                    : fmt::format("--response with one of {}", others));
@@ -393,8 +399,12 @@ std::vector<Use> recording_uses(const MachineHeader& header, const ColumnChoice&
   }
   if (time == nullptr && drive == nullptr) {
     require_not_refused(choice, ColumnRole::time, file, "--time");
+    const std::string others =
+        choice.list_of({Dimension::time, Dimension::length, Dimension::dimensionless}, {response});
     throw bad_input(file, "no column is recognised as time or displacement",
-                    fmt::format("--time or --drive with one of {}", choice.list({response})));
+                    others.empty() ? std::string("columns of them with units, such as Time (s) and "
+                                                 "Depth (mm)")
+                                   : fmt::format("--time or --drive with one of {}", others));
   }
 
   std::vector<Use> uses;

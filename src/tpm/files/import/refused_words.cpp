@@ -1,5 +1,6 @@
 #include "tpm/files/import/refused_words.hpp"
 
+#include <algorithm>
 #include <array>
 
 namespace tpm::files {
@@ -139,6 +140,7 @@ constexpr auto kRefusing = std::to_array<RefusingWord>({
     {"torque", kOther},
     {"drehmoment", kOther},
     {"couple", kOther},
+    {"aspirated", kOther},
 });
 
 /// German joins its words: Sollkraft, Kraftsollwert, Maximalkraft.
@@ -198,6 +200,16 @@ std::optional<RefusedWord> find_refused_word(const std::vector<std::string>& wor
     if (set || (word == "set" && i > 0)) return found(kAsked);
   }
   return std::nullopt;
+}
+
+bool names_another_quantity(const std::vector<std::string>& words) {
+  constexpr auto kNever = std::to_array<std::string_view>(
+      {"pressure",   "pression", "presion", "pressione", "pressao",    "vacuum",  "angle", "winkel",
+       "drehwinkel", "angulo",   "angolo",  "rotation",  "volume",     "volumen", "volum", "flow",
+       "strom",      "current",  "power",   "aspirated", "aspiration", "moment"});
+  const auto refused = find_refused_word(words);
+  return (refused && refused->why == kOther) ||
+         std::ranges::find_first_of(words, kNever) != words.end();
 }
 
 std::vector<std::string> with_parts_of_joined(std::vector<std::string> words) {

@@ -19,6 +19,10 @@ struct RefusedWord {
 /// @param words of the title, in small letters without accents
 [[nodiscard]] std::optional<RefusedWord> find_refused_word(const std::vector<std::string>& words);
 
+/// True for the words of a quantity that no recording is read from: a torque, an angle, a
+/// temperature, the pressure of a fluid.
+[[nodiscard]] bool names_another_quantity(const std::vector<std::string>& words);
+
 /// The words, and what is left of joined ones: "sollkraft" also as "kraft".
 [[nodiscard]] std::vector<std::string> with_parts_of_joined(std::vector<std::string> words);
 

@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <cmath>
 
 #include "tpm/base/lists.hpp"
@@ -129,7 +130,9 @@ std::vector<double> moved_within_bounds(std::span<const FitParameter> parameters
   std::vector<double> moved(natural.begin(), natural.end());
   for (Eigen::Index k = 0; k < by.size(); ++k) {
     const std::size_t i = free[static_cast<std::size_t>(k)];
-    moved[i] = parameters[i].natural(parameters[i].theta(natural[i]) + share * step(k));
+    const FitParameter& p = parameters[i];
+    // The longest share ends on a bound, which its rounding may pass.
+    moved[i] = std::clamp(p.natural(p.theta(natural[i]) + share * step(k)), p.lower, p.upper);
   }
   return moved;
 }

@@ -70,7 +70,8 @@ DrawnProfile drawn_profile(const ExperimentResiduals& residuals, const FitResult
   for (const double end : {walked.front().natural, walked.back().natural}) {
     std::vector<double> start = fit.best.natural;
     for (int i = 1; i <= kIntervalsPerSide; ++i) {
-      start[index] = own.natural(best + (own.theta(end) - best) * i / kIntervalsPerSide);
+      const double there = best + (own.theta(end) - best) * i / kIntervalsPerSide;
+      start[index] = std::clamp(own.natural(there), own.lower, own.upper);
       const Minimum minimum = minimise(residuals, parameters, start, fixed);
       if (!minimum.usable || end == fit.best.natural[index]) break;
       start = minimum.natural;
