@@ -103,6 +103,7 @@ struct ImportedSeries {
   std::vector<ImportFinding> findings;
   std::vector<RecordedSegment> segments;  ///< empty if the file does not say
   std::string note;                       ///< becomes part of the description's note
+  bool from_angle = false;  ///< storage or loss was computed from a phase angle or its tangent
 };
 
 /// A curve in the project's own form: `csv` and `description` are what the two files hold.

@@ -306,6 +306,7 @@ void resolve_phase(ImportedSeries& series, const std::vector<Use>& uses) {
   }
   first.shifted = polar;
   second.shifted = true;  // converted: not the digits of the file
+  series.from_angle = true;
   second.quantity = spectrum_quantities(first.unit.dimension).loss;
   second.unit = first.unit;
   series.findings.push_back(

@@ -148,7 +148,7 @@ MeasuredFile read_measured_file(const fs::path& path, const ImportOptions& optio
     throw bad_input("-", "is no file", "a file, or /dev/stdin for what a pipe brings");
   }
   if (is_described(path)) {
-    if (curve_kind_of(path) == "spectrum") return SpectrumFile{load_spectrum(file), {}};
+    if (curve_kind_of(path) == "spectrum") return SpectrumFile{load_spectrum(file)};
     return read_described(path, options);
   }
   require_no_imposed_value(options, file);
@@ -163,9 +163,10 @@ MeasuredFile read_measured_file(const fs::path& path, const ImportOptions& optio
   };
   if (holds_spectrum(series)) {
     std::vector<ImportFinding> findings = series.findings;
+    const bool from_angle = series.from_angle;
     Spectrum spectrum = assemble_spectrum(std::move(series), file, options, imported.usual);
     name_it(spectrum.header);
-    return SpectrumFile{std::move(spectrum), std::move(findings)};
+    return SpectrumFile{std::move(spectrum), std::move(findings), from_angle};
   }
   RecordingFile result = assemble_recording(std::move(series), file, options, imported.usual);
   require_samples(result, file);

@@ -35,7 +35,8 @@ void require_time_and_drive(const RecordingFile& read, const std::string& file);
 /// A spectrum read into memory, and what was understood of its file.
 struct SpectrumFile {
   Spectrum spectrum;
-  std::vector<ImportFinding> findings;
+  std::vector<ImportFinding> findings = {};
+  bool from_angle = false;  ///< a magnitude (or the storage) and a phase were measured
 };
 
 /// A recording or a spectrum from one path in the same way.

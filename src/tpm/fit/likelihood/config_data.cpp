@@ -74,6 +74,7 @@ Noise noise_of(const StatedNoise& stated, Dimension readings) {
   noise.shape = stated.shape();
   noise.scale_known = stated.scale_known;
   noise.degrees_of_freedom = stated.degrees_of_freedom.value_or(noise.degrees_of_freedom);
+  noise.angle_rad = stated.angle_rad;
   if (stated.relative && !stated.relative->estimated) noise.relative = stated.relative->number;
   if (stated.absolute && !stated.absolute->estimated) {
     noise.absolute = positive_sigma(stated.absolute->quantity, readings);

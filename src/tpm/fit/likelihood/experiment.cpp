@@ -253,6 +253,7 @@ void add_spectrum(ExperimentSet& set, const FitConfig& config, std::size_t choic
   std::vector<std::size_t> places;
   const auto add = [&](std::size_t row, Part part, Quantity quantity,
                        const std::vector<double>& values, const std::vector<double>& sds) {
+    const bool storage = part == Part::storage;
     const double frequency = spectrum.frequency_Hz[row];
     Datum reading;  // what selectors see
     reading.label = oscillation_label(quantity, frequency);
@@ -263,9 +264,18 @@ void add_spectrum(ExperimentSet& set, const FitConfig& config, std::size_t choic
     datum.quantity = quantity;
     datum.frequency_Hz = frequency;
     datum.value = values[row];
-    datum.sigma =
-        value_sigma(data, values[row], sds.empty() ? std::nullopt : std::optional(sds[row]),
-                    fmt::format("spectrum '{}', {}", data.dataset, datum.label));
+    if (data.noise.angle_rad) {
+      const PartsNoise noise =
+          noise_of_parts(data.noise, spectrum.storage[row], spectrum.loss[row]);
+      const bool beside =
+          !oscillation.readings.empty() && oscillation.readings.back().frequency == row;
+      datum.sigma = storage ? noise.storage_sd : noise.loss_sd;
+      if (beside) datum.correlation = noise.correlation;
+    } else {
+      datum.sigma =
+          value_sigma(data, values[row], sds.empty() ? std::nullopt : std::optional(sds[row]),
+                      fmt::format("spectrum '{}', {}", data.dataset, datum.label));
+    }
     datum.provenance = spectrum.provenance;
     datum.held_out = matches_any(data.hold_out, reading);
     oscillation.readings.push_back({row, part});

@@ -21,6 +21,9 @@ struct FitDatum {
   /// beyond the limit.
   std::optional<double> at_limit = std::nullopt;
   double sigma = 0.0;  ///< after the noise model; 0 where it is estimated
+  /// Of its noise with that of the datum before it: the storage beside the loss of a frequency
+  /// whose magnitude and phase were measured.
+  double correlation = 0.0;
   Provenance provenance = Provenance::assumed;
   bool held_out = false;
   bool outlier = false;  ///< held out because it is none of the curve's noise

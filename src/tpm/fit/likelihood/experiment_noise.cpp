@@ -189,7 +189,9 @@ double ExperimentResiduals::standardised(std::size_t datum, double answer,
 void ExperimentResiduals::set_value(std::size_t datum, double value) {
   if (surrogate_) surrogate_->set_value(datum, value);
   FitDatum& d = data_.at(datum);
-  d.sigma = value_sigma(config_.data[d.choice], value, d.sigma, "simulated datum");
+  if (!noise(d.choice).angle_rad) {
+    d.sigma = value_sigma(config_.data[d.choice], value, d.sigma, "simulated datum");
+  }
   d.value = value;
   set_plain_value(datum);
 }

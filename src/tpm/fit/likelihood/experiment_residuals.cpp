@@ -152,8 +152,25 @@ void ExperimentResiduals::evaluate_plain(std::span<const double> natural, Eigen:
     if (jacobian != nullptr) {
       add_rise_slopes(experiment, natural, response, rows, &plain_->factor, *jacobian);
     }
+    decorrelate(experiment, residual, jacobian);
   }
   put_priors(natural, residual, jacobian);
+}
+
+void ExperimentResiduals::decorrelate(const Experiment& experiment, Eigen::VectorXd& residual,
+                                      RowMatrix* jacobian) const {
+  for (std::size_t k = 1; k < experiment.data.size(); ++k) {
+    const std::size_t datum = experiment.data[k], before = experiment.data[k - 1];
+    const double c = data_[datum].correlation;
+    const Eigen::Index row = plain_->row[datum], other = plain_->row[before];
+    // Readings that a resampled set counts unequally are taken for independent.
+    if (c == 0.0 || row < 0 || other < 0 || weight(datum) != weight(before)) continue;
+    const double left = 1.0 / std::sqrt(1.0 - c * c);
+    residual[row] = left * (residual[row] - c * residual[other]);
+    if (jacobian != nullptr) {
+      jacobian->row(row) = left * (jacobian->row(row) - c * jacobian->row(other));
+    }
+  }
 }
 
 int ExperimentResiduals::value_count() const {

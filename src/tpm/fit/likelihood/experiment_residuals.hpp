@@ -167,6 +167,9 @@ class ExperimentResiduals final : public ResidualFunction {
     Eigen::VectorXd observed, factor;
     std::vector<Eigen::Index> row;  ///< of each datum; -1 of what is held out
   };
+  /// Makes residuals independent whose noise is correlated with that of the datum before.
+  void decorrelate(const Experiment& experiment, Eigen::VectorXd& residual,
+                   RowMatrix* jacobian) const;
   void find_drifts();
   /// The delays of an experiment's rises at these parameters.
   [[nodiscard]] std::vector<DelayedRise> rises_of(const Experiment& experiment,

@@ -123,6 +123,12 @@ std::vector<Rule<StatedNoise>> noise_rules() {
            "without Student's t",
            [](const N& n) { return n.degrees_of_freedom && n.shape() != ErrorShape::student_t; }),
       {"the sizes that the kind uses, and no other", sigma_fault},
+      rule("an angle only with normal noise of the kind 'relative_to_datum'", "angle",
+           "beside another kind or distribution",
+           [](const N& n) {
+             const bool shares = n.kind() == NoiseKind::relative_to_datum;
+             return n.angle_rad && !(shares && n.shape() == ErrorShape::normal);
+           }),
       {"an estimated scale of normal noise only; of another, \"absolute\": \"estimated\"",
        [](const N& n) -> std::optional<Fault> {
          if (n.scale_known || n.shape() == ErrorShape::normal) return std::nullopt;
@@ -163,6 +169,10 @@ const Block<StatedNoise>& noise_block_of_fit() {
            "among the parameters"),
        key("absolute", &N::absolute, absolute_sigma(),
            "a, such as \"5 mN\"; or \"estimated\" or \"estimated NAME\""),
+       key("angle", &N::angle_rad, files::quantity(Dimension::angle, kAboveZero),
+           "of a spectrum whose magnitude and phase were measured: standard deviation of the "
+           "phase, such as \"0.3 deg\"; \"relative\" is then that of the magnitude, and the noise "
+           "of storage and loss is correlated"),
        key("scale", &N::scale_known, word(kNoiseScaleWords),
            "estimated: right up to one common factor; thresholds come from F")},
       noise_rules());
@@ -190,6 +200,12 @@ std::vector<Rule<StatedData>> data_rules() {
                : std::nullopt;
   };
   return {
+      {"an angle of the noise only with the protocol 'oscillation'",
+       [](const D& d) {
+         const bool spectrum = d.protocol.kind == FitProtocol::oscillation;
+         return d.noise.angle_rad && !spectrum ? std::optional(Fault{"noise", "an angle"})
+                                               : std::nullopt;
+       }},
       {"'import' only with the protocol 'measured' or 'oscillation'",
        [](const D& d) {
          const bool importable = d.protocol.kind == FitProtocol::measured ||

@@ -75,6 +75,15 @@ double sigma_of(const Noise& noise, double datum, std::optional<double> row_sd,
   return sigma;
 }
 
+PartsNoise noise_of_parts(const Noise& noise, double storage, double loss) {
+  const double size = noise.relative, angle = noise.angle_rad.value();
+  PartsNoise parts{std::hypot(size * storage, angle * loss),
+                   std::hypot(size * loss, angle * storage)};
+  const double covariance = (size * size - angle * angle) * storage * loss;
+  parts.correlation = covariance / (parts.storage_sd * parts.loss_sd);
+  return parts;
+}
+
 std::optional<DatumResidual> value_residual(const Noise& noise, double sigma, double datum,
                                             double f) {
   DatumResidual residual;

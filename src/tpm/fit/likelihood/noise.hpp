@@ -22,6 +22,9 @@ struct Noise {
   NoiseKind kind = NoiseKind::relative_to_datum;
   double absolute = 0.0;  ///< a, SI unit of the datum
   double relative = 0.1;  ///< b, dimensionless
+  /// Of a spectrum that was measured as magnitude and phase, with b |y|: standard deviation of the
+  /// phase, rad; b is then that of the magnitude.
+  std::optional<double> angle_rad = std::nullopt;
   bool scale_known = true;
   /// Where it is not normal, a, b and the column are the law's scale, see ErrorLaw.
   ErrorShape shape = ErrorShape::normal;
@@ -65,6 +68,16 @@ inline constexpr double kNormalisationOffset = 50.0;
 /// `where` if it is not a positive number (a datum of 0 under relative noise, a missing column).
 [[nodiscard]] double sigma_of(const Noise& noise, double datum, std::optional<double> row_sd,
                               std::string_view where);
+
+/// Noise of the storage and the loss of one frequency, SI, and its correlation.
+struct PartsNoise {
+  double storage_sd = 0.0, loss_sd = 0.0, correlation = 0.0;
+};
+
+/// The same where magnitude and phase were measured, with noise of their own: d storage = storage
+/// d ln(magnitude) - loss d phase, d loss = loss d ln(magnitude) + storage d phase.
+/// @param noise with a standard deviation of the phase
+[[nodiscard]] PartsNoise noise_of_parts(const Noise& noise, double storage, double loss);
 
 /// Residual of a value. Empty if the model's answer has no likelihood there (f <= 0 under `log` or
 /// `relative_to_model`).

@@ -53,6 +53,7 @@ struct StatedNoise {
   std::optional<NoiseDistribution> distribution;
   std::optional<double> degrees_of_freedom;
   std::optional<StatedSigma> relative, absolute;
+  std::optional<double> angle_rad;
   bool scale_known = true;
   DocumentPlace place = {};
 

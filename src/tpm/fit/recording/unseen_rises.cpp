@@ -60,6 +60,12 @@ double UnseenRise::u_s() const {
   return (latest_s - earliest_s) / std::sqrt(12.0);
 }
 
+double UnseenRise::prior_sd_s(std::size_t rises) const {
+  // With n delays of equal effect at the same end, the bias is n half intervals, and n such
+  // deviations add up to sqrt(n) of one.
+  return 0.5 * (latest_s - earliest_s) * std::sqrt(static_cast<double>(rises));
+}
+
 std::vector<UnseenRise> unseen_rises(const PreparedRecording& r) {
   constexpr std::size_t kCorners = 5;                // intervals of a rise
   constexpr std::size_t kMost = 16;                  // rises of one recording
@@ -149,7 +155,7 @@ void add_rise_delays(FitConfig& config, const PreparedRecording& r, std::size_t 
              rise.expected().delay_s,
              -0.5 * lasts_s,
              0.5 * lasts_s};
-    p.prior = Prior{p.fit.start, rise.u_s(),
+    p.prior = Prior{p.fit.start, rise.prior_sd_s(rises.size()),
                     fmt::format("anywhere between the samples at {} and {} s",
                                 significant(rise.begin_s, 6), significant(rise.end_s, 6))};
     p.rise = RiseTerm{i, rise.begin_s, rise.end_s};

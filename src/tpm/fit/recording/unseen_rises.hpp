@@ -17,6 +17,10 @@ struct UnseenRise {
     return {begin_s, end_s, 0.5 * (earliest_s + latest_s)};
   }
   [[nodiscard]] double u_s() const;
+  /// Standard deviation of the prior of each of `rises` delays, s. Devices change at ticks of their
+  /// clock: the delays of a recording are no independent draws, all may lie at the same end. An
+  /// interval of 95 % contains what they do together, whatever the sampling.
+  [[nodiscard]] double prior_sd_s(std::size_t rises) const;
 };
 
 /// Rises of up to the end of the window that the samples do not resolve. A rise within one
@@ -34,8 +38,7 @@ struct UnseenRise {
 /// window as it is where no ramp was recorded before the gap.
 void end_before_unseen_motion(PreparedRecording& recording);
 
-/// Adds the delay of each of these rises to what is estimated, with a prior of the mean and
-/// standard deviation of its distribution.
+/// Adds the delay of each of these rises to what is estimated, with its prior (prior_sd_s).
 /// @param i place of the recording in config.data
 /// @param suffix of the names of the parameters
 void add_rise_delays(FitConfig& config, const PreparedRecording& recording, std::size_t i,

@@ -127,6 +127,9 @@ Noise noise_of_function(const MaterialFunction& function, const FunctionSizes& s
                                            : known(std::get<Recording>(function.data).response_sd);
   if (per_row) {
     noise.kind = NoiseKind::per_row;
+  } else if (function.from_angle) {
+    noise.relative = kShare;
+    noise.angle_rad = kShare;
   } else if (sizes.all_positive) {
     noise.kind = sizes.beyond_instruments() ? NoiseKind::combined : NoiseKind::relative_to_datum;
     noise.relative = kShare;
@@ -172,11 +175,16 @@ void add_floor(FitConfig& config, std::optional<double> floor) {
 /// Limits of the instrument, estimated from the first fits.
 struct InstrumentLimits {
   std::optional<double> scatter = std::nullopt;           ///< see scatter_floor()
+  std::optional<MagnitudeAndPhase> polar = std::nullopt;  ///< of a spectrum from these
   double to_s = std::numeric_limits<double>::infinity();  ///< behind it readings stand at a floor
 };
 
 void set_limits(FitConfig& config, const InstrumentLimits& limits) {
   add_floor(config, limits.scatter);
+  if (limits.polar) {
+    config.data.front().noise.relative = limits.polar->magnitude;
+    config.data.front().noise.angle_rad = limits.polar->phase_rad;
+  }
   config.data.front().to_s = limits.to_s;
 }
 
@@ -299,7 +307,7 @@ std::optional<MaterialFunction> material_function_of(const std::string& path,
                                                      MeasuredFile& measured) {
   if (auto* spectrum = std::get_if<SpectrumFile>(&measured)) {
     return MaterialFunction{path, std::move(spectrum->spectrum), import,
-                            columns_words(spectrum->findings)};
+                            columns_words(spectrum->findings), spectrum->from_angle};
   }
   auto& file = std::get<RecordingFile>(measured);
   if (!is_step_response(file.recording.response_quantity)) return std::nullopt;
@@ -407,6 +415,8 @@ Selection select_law(const MaterialFunction& function, const SelectionOptions& o
     limits.to_s = standing->last_s;
     s = ranked_laws(function, options, limits);
   }
+  limits.polar = scatter_of_magnitude_and_phase(s.candidates[s.best_bic].fit);
+  if (limits.polar) s = ranked_laws(function, options, limits);
   limits.scatter = scatter_floor(s.candidates[s.best_bic].fit);
   const bool scattered = limits.scatter.has_value();
   if (!scattered && standing) {
@@ -445,6 +455,7 @@ Selection select_law(const MaterialFunction& function, const SelectionOptions& o
                      standing->count, with_unit(significant(standing->value / unit.to_si, 4), unit),
                      standing->behind, significant(standing->last_s, 4))});
   }
+  if (limits.polar) s.remarks.push_back(limits.polar->remark());
   if (floor && !scattered) {
     s.remarks.push_back({"scatter_near_floor",
                          "readings little above the least are taken to scatter by as much as that, "

@@ -16,6 +16,8 @@ struct MaterialFunction {
   ImportOptions import;  ///< with which it was read, for the configuration
   std::string
       read_as;  ///< how its columns and units were understood; empty for a file with a description
+  bool from_angle =
+      false;  ///< of a spectrum: a magnitude (or the storage) and a phase were measured
 
   /// "spectrum", "relaxation modulus" or "creep compliance".
   [[nodiscard]] std::string kind() const;

@@ -4,11 +4,14 @@
 
 #include <algorithm>
 #include <cmath>
+#include <complex>
 #include <map>
+#include <numbers>
 #include <utility>
 #include <vector>
 
 #include "tpm/base/distributions.hpp"
+#include "tpm/base/text.hpp"
 #include "tpm/fit/adequacy.hpp"
 
 namespace tpm::fit {
@@ -179,6 +182,7 @@ std::vector<std::pair<double, double>> likelihoods_of_floors(const ScatterOfSize
 std::optional<double> scatter_floor(const FitResult& fit) {
   const NoiseKind kind = fit.config.data.front().noise.kind;
   if (kind != NoiseKind::relative_to_datum && kind != NoiseKind::absolute) return std::nullopt;
+  if (fit.config.data.front().noise.angle_rad) return std::nullopt;
   const auto scatter = scatter_of_sizes(fit);
   if (!scatter) return std::nullopt;
   const auto tried = likelihoods_of_floors(*scatter);
@@ -190,6 +194,39 @@ std::optional<double> scatter_floor(const FitResult& fit) {
     return std::nullopt;
   }
   return best->first;
+}
+
+Remark MagnitudeAndPhase::remark() const {
+  return {"noise_of_magnitude_and_phase",
+          fmt::format("magnitude and phase were measured, and scatter by {} % and {} deg: each "
+                      "counts by its own scatter",
+                      significant(100.0 * magnitude, 2),
+                      significant(phase_rad * 180.0 / std::numbers::pi, 2))};
+}
+
+std::optional<MagnitudeAndPhase> scatter_of_magnitude_and_phase(const FitResult& fit) {
+  constexpr std::size_t kFewest = 16;
+  constexpr double kExact = 1e-6;
+  if (!fit.config.data.front().noise.angle_rad) return std::nullopt;
+  const auto curves = reading_curves(fit);  // storage, loss
+  if (curves.size() != 2 || curves[0].size() != curves[1].size() || curves[0].size() < kFewest) {
+    return std::nullopt;
+  }
+  const std::size_t n = curves[0].size();
+  double magnitude = 0.0, phase = 0.0;
+  for (std::size_t i = 0; i < n; ++i) {
+    const ScatteredReading& storage = curves[0][i];
+    const ScatteredReading& loss = curves[1][i];
+    const std::complex<double> measured(storage.size, loss.size);
+    const auto off =
+        std::log((measured + std::complex(storage.residual, loss.residual)) / measured);
+    magnitude += off.real() * off.real();
+    phase += off.imag() * off.imag();
+  }
+  const double degrees = static_cast<double>(n) - 0.5 * static_cast<double>(fit.parameters.size());
+  MagnitudeAndPhase scatter{std::sqrt(magnitude / degrees), std::sqrt(phase / degrees)};
+  const bool scattered = scatter.magnitude > kExact && scatter.phase_rad > kExact;
+  return scattered ? std::optional(scatter) : std::nullopt;
 }
 
 std::optional<double> most_scatter_of_small(const FitResult& fit) {

@@ -32,6 +32,18 @@ void state_scatter(FitResult& fit);
 /// the file states standard deviations, or below 16 readings of a curve
 [[nodiscard]] std::optional<double> scatter_floor(const FitResult& fit);
 
+/// Standard deviations of the magnitude (of its logarithm) and of the phase of a spectrum.
+struct MagnitudeAndPhase {
+  double magnitude = 0.0, phase_rad = 0.0;
+
+  [[nodiscard]] Remark remark() const;
+};
+
+/// The scatter of both about a fit, degrees of freedom shared alike.
+/// @return none of a spectrum whose magnitude and phase were not measured, below 16 frequencies,
+/// and where one of both scatters at the level of rounding
+[[nodiscard]] std::optional<MagnitudeAndPhase> scatter_of_magnitude_and_phase(const FitResult& fit);
+
 /// Largest standard deviation that a reading of 0 may have, of noise a + b |reading|: the end of
 /// the interval (likelihood ratio, 95 %) that the scatter of the residuals allows.
 /// @return none below 16 readings of a curve, and for readings without scatter

@@ -383,13 +383,14 @@ Json config_json(const FitConfig& config) {
   };
   Json j{{"title", config.title}};
   if (config.law) {
-    const Dimension drive = quantity_dimension(config.law->drive);
+    const Unit& unit = shown_unit(quantity_dimension(config.law->drive));
     j["law"] = {{"name", law_name(*config.law)},
                 {"drive", quantity_name(config.law->drive)},
-                {"reference", text(config.law->reference, shown_unit(drive))}};
+                {"reference", text(config.law->reference, unit)}};
   } else {
     j["model"] = config.model;
   }
+  const Unit& second = shown_unit(Dimension::time);
   Json parameters = Json::object();
   std::vector<bool> estimated(model->parameters().size(), false);
   for (const EstimatedParameter& p : config.parameters) {
@@ -403,9 +404,9 @@ Json config_json(const FitConfig& config) {
       estimated[target.parameter] = true;
     }
     if (!sets.empty()) entry["sets"] = std::move(sets);
+    const auto dataset = [&](std::size_t i) { return config.data[i].dataset; };
     if (!p.sets.empty() && !p.sets.front().data.empty()) {
-      entry["for"] =
-          array_json(p.sets.front().data, [&](std::size_t i) { return config.data[i].dataset; });
+      entry["for"] = array_json(p.sets.front().data, dataset);
     }
     if (p.prior) {
       entry["prior"] = {{"mean", text(p.prior->mean, p.fit.unit)},
@@ -415,10 +416,9 @@ Json config_json(const FitConfig& config) {
     }
     if (p.drift) {
       entry["drift"] = {{"of", config.data[p.drift->choice].dataset},
-                        {"origin", text(p.drift->origin_s, shown_unit(Dimension::time))}};
+                        {"origin", text(p.drift->origin_s, second)}};
     }
     if (p.rise) {
-      const Unit& second = shown_unit(Dimension::time);
       entry["rise"] = {{"of", config.data[p.rise->choice].dataset},
                        {"begin", text(p.rise->begin_s, second)},
                        {"end", text(p.rise->end_s, second)}};
@@ -430,31 +430,31 @@ Json config_json(const FitConfig& config) {
   Json fixed = Json::object();
   for (std::size_t i = 0; i < estimated.size(); ++i) {
     if (estimated[i] || !std::isfinite(config.fixed[i])) continue;
-    const ParameterDescription& p = model->parameters()[i];
+    const auto& p = model->parameters()[i];
     fixed[std::string(p.name)] = text(config.fixed[i], shown_unit(p.dimension));
   }
   if (!fixed.empty()) j["fixed"] = std::move(fixed);
   Json data = array_json(config.data, [&](const DataChoice& d) {
-    Json entry{{"dataset", d.dataset}};
-    entry["protocol"] = {{"kind", protocol_kind_name(d.protocol.kind)}};
-    entry["noise"] = {{"kind", noise_kind_name(d.noise.kind)}};
-    if (d.load_imposed) entry["imposed"] = "response";
+    Json noise{{"kind", noise_kind_name(d.noise.kind)}};
     if (uses_absolute(d.noise.kind)) {
       const Quantity read = d.load_imposed ? config.law->drive : config.law->response;
-      entry["noise"]["absolute"] = text(d.noise.absolute, shown_unit(quantity_dimension(read)));
+      noise["absolute"] = text(d.noise.absolute, shown_unit(quantity_dimension(read)));
     }
-    if (uses_relative(d.noise.kind)) entry["noise"]["relative"] = d.noise.relative;
-    entry["noise"]["scale"] = word_for(kNoiseScaleWords, d.noise.scale_known);
+    if (uses_relative(d.noise.kind)) noise["relative"] = d.noise.relative;
+    if (d.noise.angle_rad) noise["angle"] = shortest(*d.noise.angle_rad) + " rad";
+    noise["scale"] = word_for(kNoiseScaleWords, d.noise.scale_known);
+    Json entry{{"dataset", d.dataset}};
+    entry["protocol"] = {{"kind", protocol_kind_name(d.protocol.kind)}};
+    entry["noise"] = std::move(noise);
+    if (d.load_imposed) entry["imposed"] = "response";
     if (says_how_to_read(d.import)) entry["import"] = reading_type().write(d.import);
-    const auto set_limit = [&](const char* key, const std::optional<double>& limit) {
-      if (!limit) return;
-      entry[key] = text(*limit, shown_unit(quantity_dimension(config.law->response)));
-    };
-    set_limit("contact_force", d.contact_response);
-    set_limit("clipped_above", d.clipped_above);
-    set_limit("clipped_below", d.clipped_below);
-    if (std::isfinite(d.from_s)) entry["from"] = text(d.from_s, shown_unit(Dimension::time));
-    if (std::isfinite(d.to_s)) entry["to"] = text(d.to_s, shown_unit(Dimension::time));
+    for (const auto& [key, limit] : {std::pair{"contact_force", d.contact_response},
+                                     {"clipped_above", d.clipped_above},
+                                     {"clipped_below", d.clipped_below}}) {
+      if (limit) entry[key] = text(*limit, shown_unit(quantity_dimension(config.law->response)));
+    }
+    if (std::isfinite(d.from_s)) entry["from"] = text(d.from_s, second);
+    if (std::isfinite(d.to_s)) entry["to"] = text(d.to_s, second);
     return entry;
   });
   j["data"] = std::move(data);

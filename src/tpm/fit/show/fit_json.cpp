@@ -235,6 +235,7 @@ Json assumptions_json(const FitConfig& config) {
     } else if (uses_relative(d.noise.kind)) {
       j["noise_relative"] = rounded(d.noise.relative);
     }
+    if (d.noise.angle_rad) j["noise_angle_rad"] = rounded(*d.noise.angle_rad);
     if (!d.sigma_a.empty()) {
       j["noise_absolute_parameter"] = d.sigma_a;
     } else if (d.noise.absolute > 0.0) {

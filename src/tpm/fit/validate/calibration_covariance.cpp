@@ -121,7 +121,8 @@ FittedSlopes slopes_of(const LawFile& law, const PreparedRecording& recording,
   for (std::size_t k = 0; k < file.rises.size(); ++k) {
     const auto known = std::ranges::find(unseen, file.rises[k].begin_s, &UnseenRise::begin_s);
     columns.push_back({along.by_delay(k, in.contact)(rows),
-                       known == unseen.end() ? 0.0 : std::pow(known->u_s(), -2), std::nullopt});
+                       known == unseen.end() ? 0.0 : std::pow(known->prior_sd_s(unseen.size()), -2),
+                       std::nullopt});
   }
   const Eigen::Index p = at.by_law.cols(), width = std::ssize(columns);
   FittedSlopes slopes;
