@@ -270,3 +270,27 @@ TEST_CASE("a jump of the readings while the drive rests is named", "[zero][adequ
   data.residual = slow;
   CHECK_FALSE(is_jump());
 }
+
+TEST_CASE("A law that misses the few samples of the loading does not tell contact", "[zero]") {
+  // A poroelastic half-space (Hu et al. 2010), pressed to 1.5 mm within three samples.
+  Random random(18);
+  Recording r;
+  r.header.id = "made";
+  for (int i = 0; i <= 1500; ++i) {
+    const double t = 0.2 * i, x = std::max(t - 5.25, 0.0) / 60.0;
+    const double load = std::clamp((t - 5.0) / 0.5, 0.0, 1.0);
+    const double fluid = 0.491 * std::exp(-0.908 * std::sqrt(x)) + 0.509 * std::exp(-1.679 * x);
+    r.time_s.push_back(t);
+    r.drive.push_back(1.5e-3 * load);
+    r.response.push_back(load * (0.30 + 0.22 * fluid) + 2e-4 * random.normal());
+  }
+  const FitResult fit = fitted_with("linear-3", prepare_recording("made.csv", std::move(r)));
+  REQUIRE(test::has_remark(fit.remarks, "loading_not_described"));
+  for (const char* name : {"contact", "k_inf", "k1"}) CHECK(find(fit, name).unconfirmed);
+  CHECK_FALSE(find(fit, "tau1").unconfirmed);
+  test::PlacedTest placed;
+  placed.rest_s = 20.0;
+  const FitResult healthy =
+      fitted_with("linear-1", shown_by(placed, [](std::size_t, double f) { return f; }));
+  CHECK_FALSE(test::has_remark(healthy.remarks, "loading_not_described"));
+}

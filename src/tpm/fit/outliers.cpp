@@ -34,12 +34,15 @@ double robust_deviation(const CurveDistance& d) {
   constexpr double kNoise = 1e-7;  // of the declared noise: below, it is rounding of numbers
   std::vector<double> sizes;
   for (const double z : d.distance) sizes.push_back(std::abs(z));
-  const auto middle = sizes.begin() + static_cast<std::ptrdiff_t>(sizes.size() / 2);
-  std::nth_element(sizes.begin(), middle, sizes.end());
-  const double own = kOfMedian * *middle;
+  std::ranges::sort(sizes);
+  const double own = kOfMedian * sizes[sizes.size() / 2];
   if (!(own > kNoise)) return 0.0;
-  const double rounding = quantum_of(d.reading) / std::sqrt(12.0);
-  return std::max(own, rounding / *std::ranges::min_element(d.sigma));
+  // Half of the readings are on the nearest level, and the median sees nothing, as long as noise is
+  // below 0.74 steps. The tenth that is farthest from the curve sees it from 0.3 steps on.
+  constexpr double kSeenByMedian = 0.74, kOfNineTenths = 1.645;
+  const double step = quantum_of(d.reading) / *std::ranges::min_element(d.sigma);
+  const double outer = sizes[sizes.size() * 9 / 10] / kOfNineTenths;
+  return std::max({own, step / std::sqrt(12.0), std::min(outer, kSeenByMedian * step)});
 }
 
 /// Distances that leave those of their neighbours and return. A large spike where readings are few

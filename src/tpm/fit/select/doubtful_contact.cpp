@@ -1,8 +1,15 @@
 #include "tpm/fit/select/doubtful_contact.hpp"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <array>
+#include <cmath>
+#include <string>
+#include <vector>
 
+#include "tpm/base/distributions.hpp"
+#include "tpm/base/text.hpp"
 #include "tpm/fit/conditional.hpp"
 #include "tpm/fit/verdict.hpp"
 
@@ -34,7 +41,63 @@ bool is_much_surer(const ParameterResult& p, const Prior& prior) {
   return p.standard_error && prior.sd >= kMuchLess * *p.standard_error;
 }
 
+/// Distances of the fitted samples of the first loading from the law, in standard deviations.
+struct LoadingMisfit {
+  double squares = 0.0, largest = 0.0, at_s = 0.0;
+  int count = 0;
+};
+
+LoadingMisfit misfit_of_loading(const RecordingFit& r, double noise) {
+  constexpr double kMoves = 0.01, kLoaded = 0.98;  // of the travel
+  LoadingMisfit misfit;
+  const double begin = r.drive.front(), travel = std::ranges::max(r.drive) - begin;
+  const auto reached = [&](std::size_t i, double share) {
+    return r.drive[i] - begin >= share * travel;
+  };
+  std::size_t i = 0;
+  while (i < r.drive.size() && !reached(i, kMoves)) ++i;
+  for (bool last = false; i < r.drive.size() && !last; ++i) {
+    last = reached(i, kLoaded);
+    if (!r.fitted[i] || r.outlier[i]) continue;
+    const double z = std::abs(r.standardised[i]) / noise;
+    misfit.squares += z * z;
+    ++misfit.count;
+    if (z <= misfit.largest) continue;
+    misfit.largest = z;
+    misfit.at_s = r.time_s[i];
+  }
+  return misfit;
+}
+
 }  // namespace
+
+void doubt_loading(FitResult& fit) {
+  constexpr double kLevel = 1e-4;
+  if (!fit.config.law || !(fit.variance_factor > 0.0)) return;
+  for (const RecordingFit& r : fit.recordings) {
+    if (r.drive_quantity != Quantity::indentation_depth || r.drive.empty()) continue;
+    const LoadingMisfit misfit = misfit_of_loading(r, std::sqrt(fit.variance_factor));
+    if (misfit.count == 0) continue;
+    const double inflation = r.correlation ? std::max(r.correlation->inflation(), 1.0) : 1.0;
+    if (chi_squared_tail(misfit.squares / inflation, misfit.count) >= kLevel) continue;
+    std::vector<std::string> names;
+    for (std::size_t i = 0; i < fit.parameters.size() && i < fit.config.parameters.size(); ++i) {
+      ParameterResult& p = fit.parameters[i];
+      const bool contact = p.nuisance && is_contact(fit.config, i) &&
+                           fit.config.parameters[i].sets.front().applies_to(r.choice);
+      if (p.unconfirmed || !(contact || is_counted_from_contact(p))) continue;
+      p.unconfirmed = Remark{"loading_not_described", "the law misses the samples of the loading"};
+      p.summary = parameter_words(p, fit.config.level);
+      names.push_back(p.parameter.name);
+    }
+    fit.remarks.push_back(
+        {"loading_not_described",
+         fmt::format("{}: the law misses the samples of the loading, by {} times its noise at {} "
+                     "s: what follows from them is not identified: {}",
+                     fit.config.data[r.choice].dataset, significant(misfit.largest, 2),
+                     significant(misfit.at_s, 6), fmt::join(names, ", "))});
+  }
+}
 
 void doubt_contact(FitResult& fit) {
   if (!fit.config.law || fit.config.law->kernel != Kernel::power) return;

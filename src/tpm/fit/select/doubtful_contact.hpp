@@ -14,4 +14,10 @@ namespace tpm::fit {
 /// follow from the course of the force while the depth is constant, for any loading.
 void doubt_contact(FitResult& fit);
 
+/// Few samples of a loading weigh little in a long recording: a law may describe the whole and miss
+/// them, and contact follows from them alone. Where they lie further from the law than its noise
+/// goes (chi-square, 0.01 %), contact and the stiffnesses that are counted from it are not called
+/// identified (ParameterResult::unconfirmed), and a remark says so.
+void doubt_loading(FitResult& fit);
+
 }  // namespace tpm::fit

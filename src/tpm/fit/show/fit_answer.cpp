@@ -75,13 +75,12 @@ std::string recording_words(const FitResult& fit, const RecordingFit& r) {
   if (r.peak > 0.0) {
     text += fmt::format(" ({} % of the peak)", significant(100.0 * r.rms_residual / r.peak, 3));
   }
-  const auto add = [&](const std::vector<bool>& marks, const char* what) {
-    if (const auto count = std::ranges::count(marks, true); count > 0) {
-      text += fmt::format(", {} {}", count, what);
-    }
-  };
-  add(r.censored, "censored");
-  add(r.outlier, "outliers left out");
+  if (const auto censored = std::ranges::count(r.censored, true); censored > 0) {
+    text += fmt::format(", {} censored", censored);
+  }
+  if (const auto left_out = std::ranges::count(r.outlier, true); left_out > 0) {
+    text += fmt::format(", {} outlier{} left out", left_out, left_out == 1 ? "" : "s");
+  }
   if (r.not_predicted > 0) text += fmt::format(", {} not predicted", r.not_predicted);
   return text;
 }
