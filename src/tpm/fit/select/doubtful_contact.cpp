@@ -73,13 +73,15 @@ LoadingMisfit misfit_of_loading(const RecordingFit& r, double noise) {
 
 void doubt_loading(FitResult& fit) {
   constexpr double kLevel = 1e-4;
+  constexpr double kMuchMore =
+      4.0;  // mean square, in that of the noise: one spike moves no contact
   if (!fit.config.law || !(fit.variance_factor > 0.0)) return;
   for (const RecordingFit& r : fit.recordings) {
     if (r.drive_quantity != Quantity::indentation_depth || r.drive.empty()) continue;
     const LoadingMisfit misfit = misfit_of_loading(r, std::sqrt(fit.variance_factor));
-    if (misfit.count == 0) continue;
-    const double inflation = r.correlation ? std::max(r.correlation->inflation(), 1.0) : 1.0;
-    if (chi_squared_tail(misfit.squares / inflation, misfit.count) >= kLevel) continue;
+    if (misfit.count == 0 || !(misfit.squares > kMuchMore * misfit.count)) continue;
+    const double square = misfit.largest * misfit.largest;
+    if (misfit.count * chi_squared_tail(square, 1.0) >= kLevel) continue;
     std::vector<std::string> names;
     for (std::size_t i = 0; i < fit.parameters.size() && i < fit.config.parameters.size(); ++i) {
       ParameterResult& p = fit.parameters[i];

@@ -15,9 +15,9 @@ namespace tpm::fit {
 void doubt_contact(FitResult& fit);
 
 /// Few samples of a loading weigh little in a long recording: a law may describe the whole and miss
-/// them, and contact follows from them alone. Where they lie further from the law than its noise
-/// goes (chi-square, 0.01 %), contact and the stiffnesses that are counted from it are not called
-/// identified (ParameterResult::unconfirmed), and a remark says so.
+/// them, and contact follows from them alone. Where they lie twice as far from the law as its
+/// noise goes, and one further than chance takes it (0.01 %), contact and the stiffnesses that are
+/// counted from it are not called identified (ParameterResult::unconfirmed), and a remark says so.
 void doubt_loading(FitResult& fit);
 
 }  // namespace tpm::fit
