@@ -89,7 +89,7 @@ TEST_CASE("a law that describes the loading leads where none describes the unloa
   const LawAdequacy& adequacy = best_of(s).adequacy.value();
   CHECK(adequacy.is_rejected());
   CHECK_THAT(adequacy.summary, Contains("linear describes the loading of this recording") &&
-                                   Contains("but not the unloading") &&
+                                   Contains("but the unloading is off by ") &&
                                    Contains("no law tried describes both"));
   REQUIRE_FALSE(adequacy.causes.empty());
   CHECK(adequacy.causes.front().code == "unloading_differs");
@@ -99,7 +99,6 @@ TEST_CASE("a law that describes the loading leads where none describes the unloa
   // A bad law is not excused by the residual that it leaves itself.
   for (const Candidate& c : s.candidates) {
     CAPTURE(law_name(c.law));
-    CHECK_FALSE(c.identified);
     if (c.law.branches == 0) CHECK(c.contradicted);
   }
   // Everyone says the same.
@@ -118,7 +117,8 @@ TEST_CASE("an adhesive withdrawal does not put a worse law of the loading first"
   CHECK(adequacy.is_rejected());
   CHECK_THAT(adequacy.summary, Contains("hertz describes the loading") && Contains("adhesion"));
   const ParameterResult& k = test::find(best_of(s), "k_inf");
-  CHECK((k.lower.value() < 0.02 && 0.02 < k.upper.value()));
+  const double made = 0.02 * std::sqrt(best_of(s).config.law.value().reference / 500e-9);
+  CHECK((k.lower.value() < made && made < k.upper.value()));
 }
 
 TEST_CASE("a configuration repeats that its law does not describe the unloading",
@@ -152,23 +152,26 @@ TEST_CASE("a folder is led by the law of the loading, too", "[adequacy][unloadin
 
 TEST_CASE("a law with memory that predicts the unloading goes before one without",
           "[adequacy][unloading]") {
+  // The loading alone is a power of the depth within its noise, with or without relaxation.
   test::PlacedTest placed;
-  placed.material = {60.0, 45.0, 0.6};
-  placed.rest_s = 2.0;
+  placed.law = "power-1";
+  placed.material = {60.0, 45.0, 2.0, 1.5};
+  placed.reference_m = placed.depth_m = 3e-3;
+  placed.rest_s = 3.0;
+  placed.ramp_s = 1.5;
   placed.hold_s = 0.0;
   placed.after_s = 1.0;
   placed.step_s = 0.02;
-  placed.noise_N = 6e-3;
+  placed.noise_N = 4e-4;
   int without = 0;
   for (std::uint64_t seed = 1; seed <= 5; ++seed) {
-    const Selection s = selected(test::prepared(placed, seed), {"linear", "linear-1", "hertz-1"});
-    CAPTURE(seed, fmt::format("{}", fmt::join(s.summary, "\n")));
-    const auto linear = std::ranges::find_if(
-        s.candidates, [](const Candidate& c) { return law_name(c.law) == "linear"; });
-    without += linear->delta_bic == 0.0 ? 1 : 0;
-    CHECK(linear->contradicted);
-    CHECK(lead_of(s) == "linear-1");
-    CHECK_FALSE(best_of(s).adequacy.value().is_rejected());
+    const Selection s = selected(test::prepared(placed, seed), {"power", "power-1", "linear"});
+    CAPTURE(seed, to_terminal_text(s));
+    const auto elastic = std::ranges::find_if(
+        s.candidates, [](const Candidate& c) { return law_name(c.law) == "power"; });
+    without += elastic->delta_bic == 0.0 ? 1 : 0;
+    CHECK(elastic->contradicted);
+    CHECK(s.candidates[s.recommended].law.branches == 1);
   }
   CHECK(without > 0);
 }

@@ -17,6 +17,7 @@
 #include "tpm/fit/recording/motion_before_load.hpp"
 #include "tpm/fit/select/configuration_remarks.hpp"
 #include "tpm/fit/select/doubtful_zero.hpp"
+#include "tpm/fit/select/gate.hpp"
 #include "tpm/fit/select/history_before_window.hpp"
 #include "tpm/fit/select/law_choice.hpp"
 #include "tpm/fit/select/reading_scatter.hpp"
@@ -28,8 +29,6 @@
 
 namespace tpm::fit {
 namespace {
-
-constexpr double kLevel = 0.01;
 
 /// A verdict on one recording's readings at rest, or on the noise that was stated.
 struct Judged {
@@ -143,7 +142,7 @@ std::optional<Judged> worst_of(const FitResult& fit, std::span<const RestedRecor
                                std::size_t fits = 1) {
   std::optional<Judged> worst;
   const double level =
-      kLevel / static_cast<double>(std::max<std::size_t>(fit.recordings.size(), 1) * fits);
+      kAdequacyLevel / static_cast<double>(std::max<std::size_t>(fit.recordings.size(), 1) * fits);
   for (const RecordingFit& r : fit.recordings) {
     if (rested[r.choice].recording == nullptr) continue;
     // Two tests share the level where a drift was measured.
@@ -208,7 +207,7 @@ std::optional<Judged> against_stated_noise(const FitResult& fit) {
   a.residual_over_noise = std::sqrt(squares / fit.degrees_of_freedom);
   a.noise_sd = 1.0;
   a.p_value = chi_squared_tail(degrees * squares / fit.degrees_of_freedom, degrees);
-  a.described = a.p_value < kLevel ? Described::not_described : Described::adequate;
+  a.described = a.p_value < kAdequacyLevel ? Described::not_described : Described::adequate;
   return judged;
 }
 
@@ -218,7 +217,7 @@ std::string times_the_noise(const Judged& judged) {
   const std::string times = "residual " + times_text(a.residual_over_noise) + " times the noise ";
   if (!judged.noise_was_stated) return times + (a.noise_under_load ? "under load" : "at rest");
   return fmt::format("{}that is stated, p = {} is {} {} %", times, significant(a.p_value, 2),
-                     a.p_value < kLevel ? "below" : "not below", 100.0 * kLevel);
+                     a.p_value < kAdequacyLevel ? "below" : "not below", 100.0 * kAdequacyLevel);
 }
 
 /// "this recording", or which of several.
@@ -311,14 +310,15 @@ void state_of_rests(Selection& s, std::span<const PreparedRecording> recordings)
 /// Of a law that the unloading refutes: it describes the loading alone.
 LawAdequacy of_loading_alone(const FitResult& fit, const std::string& off) {
   LawAdequacy adequacy = fit.adequacy.value_or(LawAdequacy{});
-  const std::string times =
-      adequacy.is_adequate() && adequacy.residual_over_noise
-          ? fmt::format(" (residual {} times the noise)", times_text(*adequacy.residual_over_noise))
-          : "";
-  adequacy.verdict = described_name(Described::not_described);
+  const std::string law = fit.config.law ? law_name(*fit.config.law) : "the model";
   adequacy.summary =
-      fmt::format("{} describes the loading of this recording{}, but not the unloading: {}",
-                  fit.config.law ? law_name(*fit.config.law) : "the model", times, off);
+      adequacy.is_adequate() && adequacy.residual_over_noise
+          ? fmt::format(
+                "{} describes the loading of this recording (residual {} times the noise), "
+                "but {}",
+                law, times_text(*adequacy.residual_over_noise), off)
+          : fmt::format("{} does not describe this recording: {}", law, off);
+  adequacy.verdict = described_name(Described::not_described);
   adequacy.causes.push_back({"unloading_differs", off});
   return adequacy;
 }
@@ -347,7 +347,7 @@ void state_unloading(Selection& s, std::span<const PreparedRecording> recordings
   const std::vector<UnloadingTest> tests = test_unloading(chosen.fit, data_sets(recordings));
   const auto worst = std::ranges::min_element(tests, {}, &UnloadingTest::p_value);
   if (worst == tests.end()) return;
-  if (!(worst->p_value < kLevel / static_cast<double>(tests.size()))) return;
+  if (!(worst->p_value < kAdequacyLevel / static_cast<double>(tests.size()))) return;
   const std::string differs = fmt::format(
       "the unloading is not what this law predicts: off by {} % of the peak, {} times its "
       "uncertainty",

@@ -9,6 +9,9 @@
 
 namespace tpm::fit {
 
+/// Probability of calling a law that is right not described.
+inline constexpr double kAdequacyLevel = 0.01;
+
 /// Number of samples from the first on in which nothing is loaded: before contact, or before the
 /// drive first moves. The last tenth and two more are left out, because contact is found a little
 /// late.

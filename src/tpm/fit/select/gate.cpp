@@ -9,6 +9,7 @@
 #include "tpm/base/text.hpp"
 #include "tpm/fit/adequacy.hpp"
 #include "tpm/fit/conditional.hpp"
+#include "tpm/fit/select/fit_adequacy.hpp"
 #include "tpm/fit/select/unloading_test.hpp"
 #include "tpm/fit/verdict.hpp"
 
@@ -153,11 +154,10 @@ std::optional<std::size_t> refused_by_wald_alone(Selection& s, const std::vector
 /// What is off in the unloading that a law with memory predicts; empty if nothing is.
 std::string unloading_differs(const FitResult& fit, const std::vector<DataSet>& data,
                               const FitResult& closest) {
-  constexpr double kLevel = 0.01;
   const std::vector<UnloadingTest> tests = test_unloading(fit, data);
   const auto worst = std::ranges::min_element(tests, {}, &UnloadingTest::p_value);
   if (worst == tests.end()) return unloading_off(fit, closest).words();
-  if (!(worst->p_value < kLevel / static_cast<double>(tests.size()))) return {};
+  if (!(worst->p_value < kAdequacyLevel / static_cast<double>(tests.size()))) return {};
   return fmt::format("the unloading is off by {} % of the peak, {} times its uncertainty",
                      significant(100.0 * worst->off_peak, 3), times_text(worst->times));
 }

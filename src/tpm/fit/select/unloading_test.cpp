@@ -197,7 +197,6 @@ std::string UnloadingOff::words() const {
 
 UnloadingOff unloading_off(const FitResult& fit, const FitResult& closest) {
   constexpr double kOfMedian = 1.4826, kEfficiency = 0.37;  // of a normal distribution's median
-  constexpr double kLevel = 0.01;
   UnloadingOff off;
   for (std::size_t i = 0; i < fit.recordings.size(); ++i) {
     const RecordingFit& r = fit.recordings[i];
@@ -211,7 +210,7 @@ UnloadingOff unloading_off(const FitResult& fit, const FitResult& closest) {
     const double times = kOfMedian * median(unloading) / noise.sd;  // single ones may lie far off
     const double degrees =
         kEfficiency * static_cast<double>(unloading.size()) * noise.independent_share;
-    if (!(fisher_tail(times * times, degrees, noise.degrees) < kLevel)) continue;
+    if (!(fisher_tail(times * times, degrees, noise.degrees) < kAdequacyLevel)) continue;
     off.times = std::max(off.times, times);
   }
   return off;
