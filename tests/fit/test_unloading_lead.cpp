@@ -162,7 +162,7 @@ TEST_CASE("a law with memory that predicts the unloading goes before one without
   placed.hold_s = 0.0;
   placed.after_s = 1.0;
   placed.step_s = 0.02;
-  placed.noise_N = 4e-4;
+  placed.noise_N = 3e-3;
   int without = 0;
   for (std::uint64_t seed = 1; seed <= 5; ++seed) {
     const Selection s = selected(test::prepared(placed, seed), {"power", "power-1", "linear"});

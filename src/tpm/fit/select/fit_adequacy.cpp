@@ -344,6 +344,9 @@ void state_unloading(Selection& s, std::span<const PreparedRecording> recordings
   Candidate& chosen = s.candidates[s.recommended];
   if (chosen.fit.adequacy && chosen.fit.adequacy->is_rejected()) return;
   if (protocol_spans(recordings).hold_s > 0.0) return;
+  // Where that refutes the closest law, this one was fitted to the unloading, too, and describes
+  // it.
+  if (s.candidates.front().unloading_refutes) return;
   const std::vector<UnloadingTest> tests = test_unloading(chosen.fit, data_sets(recordings));
   const auto worst = std::ranges::min_element(tests, {}, &UnloadingTest::p_value);
   if (worst == tests.end()) return;

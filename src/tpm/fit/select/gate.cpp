@@ -9,7 +9,6 @@
 #include "tpm/base/text.hpp"
 #include "tpm/fit/adequacy.hpp"
 #include "tpm/fit/conditional.hpp"
-#include "tpm/fit/select/fit_adequacy.hpp"
 #include "tpm/fit/select/unloading_test.hpp"
 #include "tpm/fit/verdict.hpp"
 
@@ -151,20 +150,10 @@ std::optional<std::size_t> refused_by_wald_alone(Selection& s, const std::vector
   return std::nullopt;
 }
 
-/// What is off in the unloading that a law with memory predicts; empty if nothing is.
-std::string unloading_differs(const FitResult& fit, const std::vector<DataSet>& data,
-                              const FitResult& closest) {
-  const std::vector<UnloadingTest> tests = test_unloading(fit, data);
-  const auto worst = std::ranges::min_element(tests, {}, &UnloadingTest::p_value);
-  if (worst == tests.end()) return unloading_off(fit, closest).words();
-  if (!(worst->p_value < kAdequacyLevel / static_cast<double>(tests.size()))) return {};
-  return fmt::format("the unloading is off by {} % of the peak, {} times its uncertainty",
-                     significant(100.0 * worst->off_peak, 3), times_text(worst->times));
-}
-
 }  // namespace
 
-void judge_unloading(Selection& s, const std::vector<DataSet>& data) {
+void judge_unloading(Selection& s, std::span<const PreparedRecording> recordings,
+                     const SetupOptions& setup) {
   const FitResult& closest = s.candidates.front().fit;
   const auto refute = [](Candidate& c, std::string words) {
     if (words.empty()) return;
@@ -178,7 +167,7 @@ void judge_unloading(Selection& s, const std::vector<DataSet>& data) {
   if (s.candidates.front().unloading_refutes) {
     for (Candidate& c : s.candidates) {
       if (c.failed || !has_memory(c.law) || c.delta_bic > kDecisiveBic) continue;
-      refute(c, unloading_differs(c.fit, data, closest));
+      refute(c, both_off(c.fit, closest, recordings, setup));
     }
   }
   s.recommended = least_within(s.candidates, s.margin);

@@ -16,10 +16,10 @@ void judge_identified(Candidate& candidate, const ProtocolSpans& spans);
 
 /// Of ranked candidates: sets `unloading_refutes` of the laws without memory whose unloading is off
 /// by more than the law of the lowest BIC leaves in the loading (unloading_off). Where that law is
-/// among them, laws with memory that describe the loading as well (within kDecisiveBic) must
-/// predict the unloading to go before it: within the uncertainty of their parameters
-/// (test_unloading), or, if these have none, as the others. Recommends anew.
-void judge_unloading(Selection& s, const std::vector<DataSet>& data);
+/// among them, laws with memory that describe the loading as well (within kDecisiveBic) go before
+/// it only if they describe loading and unloading together (both_off). Recommends anew.
+void judge_unloading(Selection& s, std::span<const PreparedRecording> recordings,
+                     const SetupOptions& setup);
 
 /// "hertz-1 describes the unloading, but is behind by 368 in BIC of the loading": the law of the
 /// lowest BIC that does; empty if none does.

@@ -459,7 +459,7 @@ Selection select_law(std::span<const PreparedRecording> recordings,
   add_laws_without_plateau(s, recordings, data, options);
   count_samples(s, laws.size());
   rank_candidates(s);
-  judge_unloading(s, data);
+  judge_unloading(s, recordings, options.setup);
   if (options.held_out) predict_held_out(s, recordings, options);
   const auto with_profiles = [&](const LawSpec& law) {
     return run_fit(recording_config(law, recordings, options.setup), data);

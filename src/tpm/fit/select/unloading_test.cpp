@@ -13,7 +13,7 @@
 #include "tpm/fit/autoregressive.hpp"
 #include "tpm/fit/likelihood/experiment_residuals.hpp"
 #include "tpm/fit/select/fit_adequacy.hpp"
-#include "tpm/fit/select/recording_setup.hpp"
+#include "tpm/work/give_up.hpp"
 
 namespace tpm::fit {
 namespace {
@@ -183,6 +183,30 @@ LoadingNoise loading_noise(const FitResult& fit, const RecordingFit& r) {
           independent / n};
 }
 
+/// Where the first unloading behind the fitted part ends; the end of that part without one.
+double end_of_unloading_s(const RecordingFit& r, double to_s) {
+  constexpr double kLeastShare = 0.2;  // of the peak
+  constexpr double kRise = 0.02;       // of the range of the drive
+  const auto first = std::ranges::find(r.fitted, true);
+  if (first == r.fitted.end()) return to_s;
+  const auto begin = static_cast<std::size_t>(first - r.fitted.begin());
+  double deepest = r.drive[begin], peak = 0.0, end_s = to_s;
+  std::size_t i = begin;
+  for (; i < r.time_s.size() && r.time_s[i] <= to_s; ++i) {
+    deepest = std::max(deepest, r.drive[i]);
+    const double rise = r.observed[i] - r.observed[begin];
+    if (r.fitted[i] && std::abs(rise) > std::abs(peak)) peak = rise;
+  }
+  double shallowest = deepest;
+  for (; i < r.time_s.size() && r.drive[i] > r.drive[begin]; ++i) {
+    if (r.drive[i] > shallowest + kRise * (deepest - r.drive[begin])) break;
+    shallowest = std::min(shallowest, r.drive[i]);
+    if (!((r.observed[i] - r.observed[begin]) / peak > kLeastShare)) break;
+    end_s = r.time_s[i];
+  }
+  return end_s;
+}
+
 }  // namespace
 
 bool has_memory(const LawSpec& law) {
@@ -214,6 +238,36 @@ UnloadingOff unloading_off(const FitResult& fit, const FitResult& closest) {
     off.times = std::max(off.times, times);
   }
   return off;
+}
+
+std::string both_off(const FitResult& fit, const FitResult& closest,
+                     std::span<const PreparedRecording> recordings, SetupOptions setup) {
+  const std::string off = unloading_off(fit, closest).words();
+  if (off.empty()) return {};
+  std::vector<PreparedRecording> longer(recordings.begin(), recordings.end());
+  for (const RecordingFit& r : fit.recordings) {
+    longer[r.choice].to_s = end_of_unloading_s(r, longer[r.choice].to_s);
+  }
+  setup.profiles = false;
+  setup.placements = nullptr;
+  FitResult both;
+  const std::string failure = gave_up([&] {
+    both = run_fit(recording_config(fit.config.law.value(), longer, setup), data_sets(longer));
+  });
+  if (!failure.empty()) return off;
+  double worst = 0.0;
+  for (std::size_t i = 0; i < both.recordings.size(); ++i) {
+    const LoadingNoise noise = loading_noise(closest, closest.recordings[i]);
+    const LoadingNoise left = loading_noise(both, both.recordings[i]);
+    if (!(noise.degrees > 0.0)) continue;
+    const double times = both.recordings[i].rms_residual / noise.sd;
+    // Residuals that repeat each other and leave no degree of freedom are no noise.
+    const double degrees = std::max(left.degrees, 1.0);
+    if (fisher_tail(times * times, degrees, noise.degrees) < kAdequacyLevel)
+      worst = std::max(worst, times);
+  }
+  if (!(worst > 0.0)) return {};
+  return fmt::format("{}; fitted to both, the residual is {} times that", off, times_text(worst));
 }
 
 std::string hysteresis_of(const FitResult& fit) {

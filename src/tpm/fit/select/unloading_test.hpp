@@ -5,6 +5,7 @@
 
 #include "tpm/fit/fit.hpp"
 #include "tpm/fit/likelihood/experiment.hpp"
+#include "tpm/fit/select/recording_setup.hpp"
 #include "tpmkit/law.hpp"
 
 namespace tpm::fit {
@@ -59,6 +60,18 @@ struct UnloadingOff {
 /// @param closest the fit whose residuals are the noise of the loading, of the same recordings: of
 ///        several laws that of the lowest BIC, lest a bad law is excused by its own residuals
 [[nodiscard]] UnloadingOff unloading_off(const FitResult& fit, const FitResult& closest);
+
+/// Whether a law describes loading and unloading together: from the loading alone its parameters,
+/// and so the unloading that it predicts, may hardly be known. It is fitted again to both, until
+/// the drive turns or the response has fallen to a fifth of the peak (contact may be lost there, or
+/// the probe adheres), and its residuals are compared with the noise of the loading (F test at 1
+/// %).
+/// @param fit of the loading
+/// @param closest as in unloading_off()
+/// @return "the unloading is off by ..., and by 12 times if it is fitted, too"; empty if it does
+[[nodiscard]] std::string both_off(const FitResult& fit, const FitResult& closest,
+                                   std::span<const PreparedRecording> recordings,
+                                   SetupOptions setup);
 
 /// A law without memory answers each depth with one force, in unloading as in loading: a hysteresis
 /// behind the fitted part contradicts it, whatever makes it (relaxation, adhesion), and what it

@@ -102,7 +102,9 @@ std::string preferred_words(const Candidate& preferred) {
                         with_unit(estimate_text(p.estimate, size, unit), unit), interval,
                         verdict_text(p));
   }
-  return fmt::format("{}, which the data prefer: {}", law_name(preferred.law), text);
+  const LawSpec& law = preferred.fit.config.law.value();
+  if (depends_on_reference(law)) text += "; " + reference_words(law);
+  return fmt::format("{}, which the data prefer: {}", law_name(law), text);
 }
 
 std::string starts_words(const FitResult& fit) {
