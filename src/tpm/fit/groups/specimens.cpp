@@ -28,6 +28,7 @@ struct Tally {
   int parameters = 0;
   int identified = 0;
   int recordings = 0;  ///< that it was fitted to
+  int refuted = 0;     ///< by their unloading
 };
 
 std::vector<Tally> tally_laws(std::span<const PreparedRecording> recordings,
@@ -42,11 +43,12 @@ std::vector<Tally> tally_laws(std::span<const PreparedRecording> recordings,
       const auto found = std::ranges::find_if(
           tallies, [&](const Tally& t) { return law_name(t.law) == law_name(c.law); });
       Tally& tally =
-          found == tallies.end() ? tallies.emplace_back(Tally{c.law, 0, 0, 0, 0}) : *found;
+          found == tallies.end() ? tallies.emplace_back(Tally{c.law, 0, 0, 0, 0, 0}) : *found;
       if (c.failed) continue;
       tally.bic += c.delta_bic;
       tally.parameters += c.parameters;
       tally.identified += c.identified ? 1 : 0;
+      tally.refuted += c.unloading_refutes ? 1 : 0;
       ++tally.recordings;
     }
   }
@@ -58,9 +60,17 @@ std::pair<LawSpec, std::string> common_law(std::span<const PreparedRecording> re
   const std::vector<Tally> tallies = tally_laws(recordings, options);
   const double margin = options.margin * static_cast<double>(recordings.size());
   const auto count = static_cast<int>(recordings.size());
+  const double decisive = kDecisiveBic * static_cast<double>(recordings.size());
+  const Tally* ahead = nullptr;
+  for (const Tally& t : tallies) {
+    if (t.recordings == count && (ahead == nullptr || t.bic < ahead->bic)) ahead = &t;
+  }
+  // As in least_within().
+  const bool refuted = ahead != nullptr && 2 * ahead->refuted > count;
   for (const bool only_identified : {true, false}) {
     const auto eligible = [&](const Tally& t) {
-      return t.recordings == count && (!only_identified || 2 * t.identified > count);
+      return t.recordings == count && (!only_identified || 2 * t.identified > count) &&
+             (!refuted || t.bic - ahead->bic <= decisive);
     };
     double best = std::numeric_limits<double>::infinity();
     for (const Tally& t : tallies) {
@@ -72,12 +82,8 @@ std::pair<LawSpec, std::string> common_law(std::span<const PreparedRecording> re
       if (chosen == nullptr || t.parameters < chosen->parameters) chosen = &t;
     }
     if (chosen == nullptr) continue;
-    const Tally* ahead = nullptr;
-    for (const Tally& t : tallies) {
-      if (t.recordings == count && (ahead == nullptr || t.bic < ahead->bic)) ahead = &t;
-    }
     std::string preferred;
-    if (chosen->bic - ahead->bic > kDecisiveBic * static_cast<double>(recordings.size())) {
+    if (chosen->bic - ahead->bic > decisive) {
       preferred = fmt::format(
           "; the data prefer {}, by {} in that sum, but identify its parameters in {} of them",
           law_name(ahead->law), significant(chosen->bic - ahead->bic, 3), ahead->identified);
@@ -133,6 +139,7 @@ SpecimenRow fit_specimen(const LawSpec& law, std::span<const PreparedRecording> 
     if (both) row.fit->remarks.push_back({"drift_not_separable", drift_words(*both, *row.fit)});
     doubt_history(*row.fit, History::unread);
     state_adequacy(*row.fit, one, rows);
+    state_hysteresis(*row.fit);
     row.place = branches_by_time(law, *row.fit);
   });
   return row;

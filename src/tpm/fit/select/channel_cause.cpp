@@ -263,12 +263,13 @@ void name_channel_cause(Selection& s, std::span<const PreparedRecording> recordi
   FitResult& fit = s.candidates[s.recommended].fit;
   if (recordings.size() != 1 || !fit.adequacy || !fit.adequacy->is_rejected()) return;
   const PreparedRecording& r = recordings.front();
+  const bool of_unloading = s.candidates[s.recommended].unloading_refutes;
   const bool judged = fit.adequacy->residual_over_noise.has_value();
-  if (!judged || !fit.adequacy->causes.empty() || r.load_imposed || r.contact_held ||
-      r.clipped_above || r.clipped_below || r.recording.time_s.size() > kMost) {
+  if (!judged || (!of_unloading && !fit.adequacy->causes.empty()) || r.load_imposed ||
+      r.contact_held || r.clipped_above || r.clipped_below || r.recording.time_s.size() > kMost) {
     return;
   }
-  if (one_describes(s, recordings) && !prefers_a_dashpot(s)) return;
+  if (!of_unloading && one_describes(s, recordings) && !prefers_a_dashpot(s)) return;
   if (sticks(r)) {
     const std::string cause = fmt::format(
         "adhesion: the {} falls below its rest as the probe withdraws: it sticks, which these laws "
@@ -278,6 +279,7 @@ void name_channel_cause(Selection& s, std::span<const PreparedRecording> recordi
     fit.adequacy->summary += fmt::format("; likely cause: {}", cause);
     return;
   }
+  if (of_unloading) return;  // a channel that is late bends the loading, too
   SetupOptions quick = setup;
   quick.profiles = false;
   quick.placements = nullptr;

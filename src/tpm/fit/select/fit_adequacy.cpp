@@ -9,7 +9,6 @@
 #include <utility>
 
 #include "tpm/base/distributions.hpp"
-#include "tpm/base/median.hpp"
 #include "tpm/base/remark.hpp"
 #include "tpm/base/text.hpp"
 #include "tpm/fit/adequacy.hpp"
@@ -18,6 +17,7 @@
 #include "tpm/fit/recording/motion_before_load.hpp"
 #include "tpm/fit/select/configuration_remarks.hpp"
 #include "tpm/fit/select/doubtful_zero.hpp"
+#include "tpm/fit/select/gate.hpp"
 #include "tpm/fit/select/history_before_window.hpp"
 #include "tpm/fit/select/law_choice.hpp"
 #include "tpm/fit/select/reading_scatter.hpp"
@@ -29,8 +29,6 @@
 
 namespace tpm::fit {
 namespace {
-
-constexpr double kLevel = 0.01;
 
 /// A verdict on one recording's readings at rest, or on the noise that was stated.
 struct Judged {
@@ -139,18 +137,12 @@ bool has_measured_drift(const FitResult& fit, std::size_t choice) {
   });
 }
 
-/// Parameters that a recording's residuals have to pay for: an equal share of all.
-int parameters_each(const FitResult& fit) {
-  const auto count = static_cast<int>(std::max<std::size_t>(fit.recordings.size(), 1));
-  return (static_cast<int>(fit.parameters.size()) + count - 1) / count;
-}
-
 /// The recording that the law describes worst; so many fits share the level.
 std::optional<Judged> worst_of(const FitResult& fit, std::span<const RestedRecording> rested,
                                std::size_t fits = 1) {
   std::optional<Judged> worst;
   const double level =
-      kLevel / static_cast<double>(std::max<std::size_t>(fit.recordings.size(), 1) * fits);
+      kAdequacyLevel / static_cast<double>(std::max<std::size_t>(fit.recordings.size(), 1) * fits);
   for (const RecordingFit& r : fit.recordings) {
     if (rested[r.choice].recording == nullptr) continue;
     // Two tests share the level where a drift was measured.
@@ -192,18 +184,6 @@ std::vector<RestedRecording> rested(std::span<const PreparedRecording> recording
   return list;
 }
 
-/// Independent samples that correlated ones count as, in a sum of squares: n (1 - r^2) / (1 + r^2),
-/// at the upper confidence bound of their lag-1 correlation.
-double degrees_of(const RecordingFit& fit) {
-  constexpr double kSureness = 2.0, kMost = 0.98;
-  const auto n = static_cast<double>(std::ranges::count(fit.fitted, true));
-  if (!fit.correlation || n < 2.0) return n;
-  const double r = fit.correlation->lag1;
-  const double error = std::sqrt(std::max(1.0 - r * r, 0.05) / n);
-  const double upper = std::clamp(r + kSureness * error, 0.0, kMost);
-  return n * (1.0 - upper * upper) / (1.0 + upper * upper);
-}
-
 /// The residuals against noise whose size the configuration states, bands that are missed among
 /// them: of readings alone FitResult::chi_square_p. None if it is no normal law, or if nothing is
 /// left to test.
@@ -219,7 +199,7 @@ std::optional<Judged> against_stated_noise(const FitResult& fit) {
     for (std::size_t i = 0; i < r.standardised.size(); ++i) {
       if (r.fitted[i]) squares += r.standardised[i] * r.standardised[i];
     }
-    degrees += degrees_of(r);
+    degrees += independent_samples(r);
   }
   degrees = std::max(degrees - static_cast<double>(fit.parameters.size()), 1.0);
   Judged judged{{}, std::nullopt, true, {}};
@@ -227,7 +207,7 @@ std::optional<Judged> against_stated_noise(const FitResult& fit) {
   a.residual_over_noise = std::sqrt(squares / fit.degrees_of_freedom);
   a.noise_sd = 1.0;
   a.p_value = chi_squared_tail(degrees * squares / fit.degrees_of_freedom, degrees);
-  a.described = a.p_value < kLevel ? Described::not_described : Described::adequate;
+  a.described = a.p_value < kAdequacyLevel ? Described::not_described : Described::adequate;
   return judged;
 }
 
@@ -237,7 +217,7 @@ std::string times_the_noise(const Judged& judged) {
   const std::string times = "residual " + times_text(a.residual_over_noise) + " times the noise ";
   if (!judged.noise_was_stated) return times + (a.noise_under_load ? "under load" : "at rest");
   return fmt::format("{}that is stated, p = {} is {} {} %", times, significant(a.p_value, 2),
-                     a.p_value < kLevel ? "below" : "not below", 100.0 * kLevel);
+                     a.p_value < kAdequacyLevel ? "below" : "not below", 100.0 * kAdequacyLevel);
 }
 
 /// "this recording", or which of several.
@@ -327,37 +307,34 @@ void state_of_rests(Selection& s, std::span<const PreparedRecording> recordings)
   chosen.reason = "does not describe the data";
 }
 
-/// Sizes of the residuals of the first unloading behind the fitted part, down to the drive at which
-/// that part begins.
-std::vector<double> unloading_of(const RecordingFit& r) {
-  std::vector<double> sizes;
-  const auto first = std::ranges::find(r.fitted, true);
-  const auto last = std::find(r.fitted.rbegin(), r.fitted.rend(), true);
-  if (first == r.fitted.end()) return sizes;
-  const auto begin = static_cast<std::size_t>(first - r.fitted.begin());
-  const auto end = static_cast<std::size_t>(r.fitted.rend() - last);
-  double deepest = r.drive[begin];
-  for (std::size_t i = begin; i < end; ++i) deepest = std::max(deepest, r.drive[i]);
-  for (std::size_t i = end; i < r.time_s.size() && r.drive[i] > r.drive[begin]; ++i) {
-    if (r.drive[i] > deepest || r.is_censored(i) || !std::isfinite(r.predicted[i])) continue;
-    sizes.push_back(std::abs(r.observed[i] - r.predicted[i]));
-  }
-  return sizes;
+/// Of a law that the unloading refutes: it describes the loading alone.
+LawAdequacy of_loading_alone(const FitResult& fit, const std::string& off) {
+  LawAdequacy adequacy = fit.adequacy.value_or(LawAdequacy{});
+  const std::string law = fit.config.law ? law_name(*fit.config.law) : "the model";
+  adequacy.summary =
+      adequacy.is_adequate() && adequacy.residual_over_noise
+          ? fmt::format(
+                "{} describes the loading of this recording (residual {} times the noise), "
+                "but {}",
+                law, times_text(*adequacy.residual_over_noise), off)
+          : fmt::format("{} does not describe this recording: {}", law, off);
+  adequacy.verdict = described_name(Described::not_described);
+  adequacy.causes.push_back({"unloading_differs", off});
+  return adequacy;
 }
 
-void state_hysteresis(Selection& s) {
+void state_refuted(Selection& s) {
   Candidate& chosen = s.candidates[s.recommended];
+  if (!chosen.unloading_refutes) return;
   if (chosen.fit.adequacy && chosen.fit.adequacy->is_rejected()) return;
-  const std::string seen = hysteresis_of(chosen.fit);
-  if (seen.empty()) return;
-  LawAdequacy adequacy = chosen.fit.adequacy.value_or(LawAdequacy{});
-  adequacy.verdict = described_name(Described::not_described);
-  adequacy.summary = fmt::format(
-      "{} does not describe this recording: {}, and a law without memory has no hysteresis; hold "
-      "the depth, to see what relaxes",
-      law_name(chosen.law), seen);
+  LawAdequacy adequacy = of_loading_alone(chosen.fit, chosen.reason);
+  const std::string other = law_of_unloading(s);
+  adequacy.summary += !other.empty() ? "; " + other
+                      : s.candidates.size() == 1
+                          ? fmt::format(" (only {} was tried)", law_name(chosen.law))
+                          : "; no law tried describes both";
+  adequacy.summary += "; hold the depth, to see what relaxes";
   state(chosen.fit, std::move(adequacy));
-  chosen.identified = false;
   chosen.reason = "does not describe the unloading";
 }
 
@@ -367,10 +344,13 @@ void state_unloading(Selection& s, std::span<const PreparedRecording> recordings
   Candidate& chosen = s.candidates[s.recommended];
   if (chosen.fit.adequacy && chosen.fit.adequacy->is_rejected()) return;
   if (protocol_spans(recordings).hold_s > 0.0) return;
+  // Where that refutes the closest law, this one was fitted to the unloading, too, and describes
+  // it.
+  if (s.candidates.front().unloading_refutes) return;
   const std::vector<UnloadingTest> tests = test_unloading(chosen.fit, data_sets(recordings));
   const auto worst = std::ranges::min_element(tests, {}, &UnloadingTest::p_value);
   if (worst == tests.end()) return;
-  if (!(worst->p_value < kLevel / static_cast<double>(tests.size()))) return;
+  if (!(worst->p_value < kAdequacyLevel / static_cast<double>(tests.size()))) return;
   const std::string differs = fmt::format(
       "the unloading is not what this law predicts: off by {} % of the peak, {} times its "
       "uncertainty",
@@ -388,35 +368,37 @@ void state_unloading(Selection& s, std::span<const PreparedRecording> recordings
 
 }  // namespace
 
-void state_better(FitResult& fit, const std::string& law, const std::string& better, double by) {
+double independent_samples(const RecordingFit& fit) {
+  constexpr double kSureness = 2.0, kMost = 0.98;
+  const auto n = static_cast<double>(std::ranges::count(fit.fitted, true));
+  if (!fit.correlation || n < 2.0) return n;
+  const double r = fit.correlation->lag1;
+  const double error = std::sqrt(std::max(1.0 - r * r, 0.05) / n);
+  const double upper = std::clamp(r + kSureness * error, 0.0, kMost);
+  return n * (1.0 - upper * upper) / (1.0 + upper * upper);
+}
+
+int parameters_each(const FitResult& fit) {
+  const auto count = static_cast<int>(std::max<std::size_t>(fit.recordings.size(), 1));
+  return (static_cast<int>(fit.parameters.size()) + count - 1) / count;
+}
+
+void state_hysteresis(FitResult& fit) {
+  if (fit.adequacy && fit.adequacy->is_rejected()) return;
+  const std::string off = hysteresis_of(fit);
+  if (!off.empty()) state(fit, of_loading_alone(fit, off));
+}
+
+void state_as(FitResult& fit, const std::string& not_described) {
   LawAdequacy adequacy = fit.adequacy.value_or(LawAdequacy{});
   adequacy.verdict = described_name(Described::not_described);
-  adequacy.summary = fmt::format("{} does not describe these data: {} does better, by {} in BIC",
-                                 law, better, significant(by, 3));
+  adequacy.summary = not_described;
   state(fit, std::move(adequacy));
 }
 
-std::string hysteresis_of(const FitResult& fit) {
-  constexpr std::size_t kFewest = 8;
-  constexpr double kOfMedian = 1.4826, kEfficiency = 0.37;  // of a normal distribution's median
-  const auto& law = fit.config.law;
-  if (!law || law->branches > 0 || law->fractional != Fractional::none) return {};
-  for (const RecordingFit& r : fit.recordings) {
-    if (fit.config.data[r.choice].load_imposed) continue;
-    const std::vector<double> unloading = unloading_of(r);
-    const auto n = static_cast<double>(std::ranges::count(r.fitted, true));
-    const double parameters = parameters_each(fit);
-    const double independent = degrees_of(r);
-    const bool enough = unloading.size() >= kFewest && independent > parameters + 1.0;
-    if (!enough || !(r.rms_residual > 0.0)) continue;
-    const double loading = r.rms_residual * std::sqrt(n / (n - parameters));
-    const double times = kOfMedian * median(unloading) / loading;  // single ones may lie far off
-    const double degrees = kEfficiency * static_cast<double>(unloading.size()) * independent / n;
-    if (!(fisher_tail(times * times, degrees, independent - parameters) < kLevel)) continue;
-    return fmt::format("the unloading is off by {} times the residual of the loading",
-                       times_text(times));
-  }
-  return {};
+void state_better(FitResult& fit, const std::string& law, const std::string& better, double by) {
+  state_as(fit, fmt::format("{} does not describe these data: {} does better, by {} in BIC", law,
+                            better, significant(by, 3)));
 }
 
 std::size_t samples_at_rest(const RecordingPhases& phases) {
@@ -459,7 +441,7 @@ void state_adequacy(Selection& s, std::span<const PreparedRecording> recordings)
   }
   state_of_rests(s, recordings);
   state_preferred(s);
-  state_hysteresis(s);
+  state_refuted(s);
   state_unloading(s, recordings);
 }
 

@@ -9,6 +9,9 @@
 
 namespace tpm::fit {
 
+/// Probability of calling a law that is right not described.
+inline constexpr double kAdequacyLevel = 0.01;
+
 /// Number of samples from the first on in which nothing is loaded: before contact, or before the
 /// drive first moves. The last tenth and two more are left out, because contact is found a little
 /// late.
@@ -23,6 +26,13 @@ void state_adequacy(Selection& s, std::span<const PreparedRecording> recordings)
 /// Where the data prefer another law decisively (Selection::preferred), the recommended one does
 /// not describe them, whatever its residual is beside the noise.
 void state_preferred(Selection& s);
+
+/// States that the law does not describe the data, in these words.
+void state_as(FitResult& fit, const std::string& not_described);
+
+/// States of a law without memory that it does not describe an unloading with hysteresis
+/// (hysteresis_of), unless it is rejected already.
+void state_hysteresis(FitResult& fit);
 
 /// States that another law does better decisively: the fitted one does not describe the data.
 /// @param by in BIC
@@ -44,11 +54,11 @@ void state_adequacy(FitResult& fit, const std::vector<DataSet>& data);
 /// (configuration_remarks).
 [[nodiscard]] FitResult fit_and_judge(const FitProblem& problem);
 
-/// A law without memory answers each depth with one force, in unloading as in loading: a hysteresis
-/// behind the fitted part contradicts it, whatever makes it (relaxation, adhesion), and what it
-/// calls the equilibrium.
-/// @return what is seen (F test at 1 %); empty if nothing speaks against the law, or it has a
-/// memory
-[[nodiscard]] std::string hysteresis_of(const FitResult& fit);
+/// Independent samples that correlated ones count as, in a sum of squares: n (1 - r^2) / (1 + r^2),
+/// at the upper confidence bound of their lag-1 correlation.
+[[nodiscard]] double independent_samples(const RecordingFit& fit);
+
+/// Parameters that a recording's residuals have to pay for: an equal share of all.
+[[nodiscard]] int parameters_each(const FitResult& fit);
 
 }  // namespace tpm::fit

@@ -7,8 +7,9 @@
 #include <utility>
 
 #include "tpm/base/text.hpp"
+#include "tpm/fit/adequacy.hpp"
 #include "tpm/fit/conditional.hpp"
-#include "tpm/fit/select/fit_adequacy.hpp"
+#include "tpm/fit/select/unloading_test.hpp"
 #include "tpm/fit/verdict.hpp"
 
 namespace tpm::fit {
@@ -36,7 +37,6 @@ bool may_vanish(const LawSpec& law, const std::string& parameter) {
 
 /// See Candidate::contradicted.
 bool contradicts(const Candidate& candidate, const ProtocolSpans& spans) {
-  if (!hysteresis_of(candidate.fit).empty()) return true;
   double longest_s = 0.0;
   const auto table = law_parameters(candidate.fit.config.law.value());
   for (const ParameterResult& p : candidate.fit.parameters) {
@@ -66,7 +66,6 @@ std::string dashpot_words(const FitResult& fit, const std::string& time_name) {
 
 Refusal refusal_of(const Candidate& candidate, const ProtocolSpans& spans) {
   constexpr int kLeastStandardErrors = 2;
-  if (const std::string seen = hysteresis_of(candidate.fit); !seen.empty()) return {seen};
   double longest_s = 0.0;
   Refusal first;  // of a standard error: other reasons go before it
   const auto keep = [&](Refusal refusal) {
@@ -153,6 +152,40 @@ std::optional<std::size_t> refused_by_wald_alone(Selection& s, const std::vector
 
 }  // namespace
 
+void judge_unloading(Selection& s, std::span<const PreparedRecording> recordings,
+                     const SetupOptions& setup) {
+  const FitResult& closest = s.candidates.front().fit;
+  const auto refute = [](Candidate& c, std::string words) {
+    if (words.empty()) return;
+    c.unloading_refutes = c.contradicted = true;
+    c.identified = c.by_wald = false;
+    c.reason = std::move(words);
+  };
+  for (Candidate& c : s.candidates) {
+    if (!c.failed && !has_memory(c.law)) refute(c, unloading_off(c.fit, closest).words());
+  }
+  if (s.candidates.front().unloading_refutes) {
+    for (Candidate& c : s.candidates) {
+      if (c.failed || !has_memory(c.law) || c.delta_bic > kDecisiveBic) continue;
+      refute(c, both_off(c.fit, closest, recordings, setup));
+    }
+  }
+  s.recommended = least_within(s.candidates, s.margin);
+}
+
+std::string law_of_unloading(const Selection& s) {
+  const Candidate& closest = s.candidates.front();
+  const std::size_t samples = unloading_off(closest.fit, closest.fit).samples;
+  for (const Candidate& c : s.candidates) {
+    if (c.failed || c.unloading_refutes) continue;
+    const UnloadingOff off = unloading_off(c.fit, closest.fit);
+    if (off.samples < samples || off.times > 0.0) continue;
+    return fmt::format("{} describes the unloading, but is behind by {} in BIC of the loading",
+                       law_name(c.law), significant(c.delta_bic, 3));
+  }
+  return {};
+}
+
 std::string not_identified(const Candidate& candidate, const ProtocolSpans& spans) {
   return refusal_of(candidate, spans).reason;
 }
@@ -167,6 +200,7 @@ void judge_identified(Candidate& candidate, const ProtocolSpans& spans) {
 }
 
 void reassess(Candidate& chosen, const ProtocolSpans& spans) {
+  if (chosen.unloading_refutes) return;
   // Profiles show a minimum that is not trusted; nothing else that they show speaks against a law.
   const bool doubtful = std::ranges::any_of(
       chosen.fit.parameters, [](const ParameterResult& p) { return p.unconfirmed.has_value(); });
@@ -221,6 +255,9 @@ std::string least_law_words(const Selection& s, const std::string& data) {
                               : "that the protocol does not contradict");
   }
   if (s.candidates.size() == 1) return "the law that was asked for is";
+  if (chosen.unloading_refutes) {
+    return fmt::format("of the loading alone the simplest law that {} support is", data);
+  }
   if (chosen.fit.adequacy && chosen.fit.adequacy->is_rejected()) {
     return fmt::format("no law that is identified describes {}; the least of {} is",
                        data == "they" ? "them" : data, s.candidates.size());

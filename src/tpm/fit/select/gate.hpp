@@ -14,6 +14,17 @@ inline constexpr double kDecisiveBic = 10.0;
 /// fitted.
 void judge_identified(Candidate& candidate, const ProtocolSpans& spans);
 
+/// Of ranked candidates: sets `unloading_refutes` of the laws without memory whose unloading is off
+/// by more than the law of the lowest BIC leaves in the loading (unloading_off). Where that law is
+/// among them, laws with memory that describe the loading as well (within kDecisiveBic) go before
+/// it only if they describe loading and unloading together (both_off). Recommends anew.
+void judge_unloading(Selection& s, std::span<const PreparedRecording> recordings,
+                     const SetupOptions& setup);
+
+/// "hertz-1 describes the unloading, but is behind by 368 in BIC of the loading": the law of the
+/// lowest BIC that does; empty if none does.
+[[nodiscard]] std::string law_of_unloading(const Selection& s);
+
 /// Fits a law again with profiles.
 using ProfiledFit = std::function<FitResult(const LawSpec&)>;
 

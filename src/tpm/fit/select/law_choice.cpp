@@ -95,6 +95,8 @@ void repeat_choice(FitResult& fit) {
   if (rejected && !choice.not_described.empty()) fit.adequacy->summary = choice.not_described;
   if (!choice.better.empty() && !rejected) {
     state_better(fit, law, choice.better, choice.better_by);
+  } else if (!choice.not_described.empty() && !rejected) {
+    state_as(fit, choice.not_described);
   }
   for (const std::string& words : choice.conditions) {
     fit.remarks.push_back({"condition_of_choice", words});

@@ -241,8 +241,9 @@ void describe(Selection& s) {
   if (s.recommended != s.best_bic && !s.preferred) {
     s.summary.push_back(fmt::format(
         "{} has the lowest BIC, by {}, {}", law_name(best.law), significant(chosen.delta_bic, 3),
-        best.identified ? fmt::format("less than the margin of {}", significant(s.margin, 3))
-                        : "but is not identified: " + best.reason));
+        best.identified || chosen.unloading_refutes
+            ? fmt::format("less than the margin of {}", significant(s.margin, 3))
+            : "but is not identified: " + best.reason));
   }
   for (std::size_t i = 0; i < best.held_out.size() && best.held_out.size() > 1; ++i) {
     describe_prediction(s, i);
@@ -311,10 +312,16 @@ std::size_t least_within(const std::vector<Candidate>& candidates, double margin
   // If no law is identified, one whose times the protocol could show goes before one that only
   // fits.
   enum class Eligible { identified, not_contradicted, all };
+  // What the unloading alone speaks against gives way to a law that describes the loading as well.
+  const bool refuted = std::ranges::any_of(candidates, [](const Candidate& c) {
+    return !c.failed && c.delta_bic == 0.0 && c.unloading_refutes;
+  });
+  const double farthest = refuted ? kDecisiveBic : std::numeric_limits<double>::infinity();
   for (const Eligible which : {Eligible::identified, Eligible::not_contradicted, Eligible::all}) {
     const auto eligible = [&](const Candidate& c) {
-      return !c.failed && (c.identified || which == Eligible::all ||
-                           (which == Eligible::not_contradicted && !c.contradicted));
+      return !c.failed && c.delta_bic <= farthest &&
+             (c.identified || which == Eligible::all ||
+              (which == Eligible::not_contradicted && !c.contradicted));
     };
     double best = std::numeric_limits<double>::infinity();
     for (const Candidate& c : candidates) {
@@ -452,6 +459,7 @@ Selection select_law(std::span<const PreparedRecording> recordings,
   add_laws_without_plateau(s, recordings, data, options);
   count_samples(s, laws.size());
   rank_candidates(s);
+  judge_unloading(s, recordings, options.setup);
   if (options.held_out) predict_held_out(s, recordings, options);
   const auto with_profiles = [&](const LawSpec& law) {
     return run_fit(recording_config(law, recordings, options.setup), data);

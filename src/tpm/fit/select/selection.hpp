@@ -34,10 +34,14 @@ struct Candidate {
   /// full rank, each stiffness more than two standard errors above 0 (k_inf beside branches may be
   /// 0), each relaxation time sampled by kLeastSamples; of a fluid, a hold that shows its end.
   bool identified = true;
-  /// A relaxation time below the sampling, or a fluid from a hold too short to tell.
+  /// A relaxation time below the sampling, a fluid from a hold too short to tell, or an unloading
+  /// that refutes the law.
   bool contradicted = false;
   bool by_wald = false;  ///< a standard error alone speaks against it, no profile yet
-  std::string special;   ///< what simpler law it is there ("the spring-pot is a dashpot"), or empty
+  /// The unloading behind the fitted part is not what the law predicts (judge_unloading); the
+  /// parameters may be known from the loading all the same.
+  bool unloading_refutes = false;
+  std::string special;  ///< what simpler law it is there ("the spring-pot is a dashpot"), or empty
   std::vector<HeldOut> held_out;
 };
 
@@ -86,7 +90,9 @@ struct Selection {
 ///
 /// Fits every law to the recordings together and recommends the least: of the laws whose parameters
 /// are identified (or, if none is, of those that the protocol does not contradict, or of all), the
-/// one with the fewest parameters whose BIC is within the margin of the best of these. AICc and BIC
+/// one with the fewest parameters whose BIC is within the margin of the best of these. Where the
+/// unloading refutes the law of the lowest BIC, laws that are behind it by more than kDecisiveBic
+/// are left out: they do not describe the loading. AICc and BIC
 /// count the effective number of readings, because neighbouring residuals repeat each other; with n
 /// samples of n_eff effective ones, -2 ln L = n_eff ln(RSS/n).
 ///

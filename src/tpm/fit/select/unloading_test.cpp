@@ -1,14 +1,19 @@
 #include "tpm/fit/select/unloading_test.hpp"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <cmath>
 
 #include "tpm/base/dense_algebra.hpp"
 #include "tpm/base/distributions.hpp"
+#include "tpm/base/median.hpp"
 #include "tpm/base/namespaces.hpp"
+#include "tpm/fit/adequacy.hpp"
 #include "tpm/fit/autoregressive.hpp"
 #include "tpm/fit/likelihood/experiment_residuals.hpp"
-#include "tpm/fit/select/recording_setup.hpp"
+#include "tpm/fit/select/fit_adequacy.hpp"
+#include "tpm/work/give_up.hpp"
 
 namespace tpm::fit {
 namespace {
@@ -17,8 +22,7 @@ constexpr std::size_t kFewestUnloading = 8;
 
 bool is_testable(const FitResult& fit) {
   const FitConfig& config = fit.config;
-  const bool memory =
-      config.law && (config.law->branches > 0 || config.law->fractional != Fractional::none);
+  const bool memory = config.law && has_memory(*config.law);
   const bool plain = std::ranges::all_of(config.data, [](const DataChoice& d) {
     const bool of_share =
         d.noise.kind == NoiseKind::log || d.noise.kind == NoiseKind::relative_to_model;
@@ -146,7 +150,130 @@ std::optional<UnloadingTest> test_of(const FitResult& fit, const ExperimentResid
   return test;
 }
 
+/// Sizes of the residuals of the first unloading behind the fitted part, down to the drive at which
+/// that part begins.
+std::vector<double> unloading_of(const RecordingFit& r) {
+  std::vector<double> sizes;
+  const auto first = std::ranges::find(r.fitted, true);
+  const auto last = std::find(r.fitted.rbegin(), r.fitted.rend(), true);
+  if (first == r.fitted.end()) return sizes;
+  const auto begin = static_cast<std::size_t>(first - r.fitted.begin());
+  const auto end = static_cast<std::size_t>(r.fitted.rend() - last);
+  double deepest = r.drive[begin];
+  for (std::size_t i = begin; i < end; ++i) deepest = std::max(deepest, r.drive[i]);
+  for (std::size_t i = end; i < r.time_s.size() && r.drive[i] > r.drive[begin]; ++i) {
+    if (r.drive[i] > deepest || r.is_censored(i) || !std::isfinite(r.predicted[i])) continue;
+    sizes.push_back(std::abs(r.observed[i] - r.predicted[i]));
+  }
+  return sizes;
+}
+
+/// What the residuals of a fitted part tell of its noise.
+struct LoadingNoise {
+  double sd = 0.0, degrees = 0.0;  ///< 0 degrees: nothing
+  double independent_share = 1.0;  ///< of the samples
+};
+
+LoadingNoise loading_noise(const FitResult& fit, const RecordingFit& r) {
+  const auto n = static_cast<double>(std::ranges::count(r.fitted, true));
+  const double parameters = parameters_each(fit);
+  const double independent = independent_samples(r);
+  if (!(independent > parameters + 1.0) || !(r.rms_residual > 0.0)) return {};
+  return {r.rms_residual * std::sqrt(n / (n - parameters)), independent - parameters,
+          independent / n};
+}
+
+/// Where the first unloading behind the fitted part ends; the end of that part without one.
+double end_of_unloading_s(const RecordingFit& r, double to_s) {
+  constexpr double kLeastShare = 0.2;  // of the peak
+  constexpr double kRise = 0.02;       // of the range of the drive
+  const auto first = std::ranges::find(r.fitted, true);
+  if (first == r.fitted.end()) return to_s;
+  const auto begin = static_cast<std::size_t>(first - r.fitted.begin());
+  double deepest = r.drive[begin], peak = 0.0, end_s = to_s;
+  std::size_t i = begin;
+  for (; i < r.time_s.size() && r.time_s[i] <= to_s; ++i) {
+    deepest = std::max(deepest, r.drive[i]);
+    const double rise = r.observed[i] - r.observed[begin];
+    if (r.fitted[i] && std::abs(rise) > std::abs(peak)) peak = rise;
+  }
+  double shallowest = deepest;
+  for (; i < r.time_s.size() && r.drive[i] > r.drive[begin]; ++i) {
+    if (r.drive[i] > shallowest + kRise * (deepest - r.drive[begin])) break;
+    shallowest = std::min(shallowest, r.drive[i]);
+    if (!((r.observed[i] - r.observed[begin]) / peak > kLeastShare)) break;
+    end_s = r.time_s[i];
+  }
+  return end_s;
+}
+
 }  // namespace
+
+bool has_memory(const LawSpec& law) {
+  return law.branches > 0 || law.fractional != Fractional::none;
+}
+
+std::string UnloadingOff::words() const {
+  if (!(times > 0.0)) return {};
+  return fmt::format("the unloading is off by {} times the residual of the loading",
+                     times_text(times));
+}
+
+UnloadingOff unloading_off(const FitResult& fit, const FitResult& closest) {
+  constexpr double kOfMedian = 1.4826, kEfficiency = 0.37;  // of a normal distribution's median
+  UnloadingOff off;
+  for (std::size_t i = 0; i < fit.recordings.size(); ++i) {
+    const RecordingFit& r = fit.recordings[i];
+    if (fit.config.data[r.choice].load_imposed) continue;
+    const std::vector<double> unloading = unloading_of(r);
+    if (unloading.size() < kFewestUnloading) continue;
+    LoadingNoise noise = loading_noise(closest, closest.recordings[i]);
+    if (!(noise.degrees > 0.0)) noise = loading_noise(fit, r);
+    if (!(noise.degrees > 0.0)) continue;
+    off.samples += unloading.size();
+    const double times = kOfMedian * median(unloading) / noise.sd;  // single ones may lie far off
+    const double degrees =
+        kEfficiency * static_cast<double>(unloading.size()) * noise.independent_share;
+    if (!(fisher_tail(times * times, degrees, noise.degrees) < kAdequacyLevel)) continue;
+    off.times = std::max(off.times, times);
+  }
+  return off;
+}
+
+std::string both_off(const FitResult& fit, const FitResult& closest,
+                     std::span<const PreparedRecording> recordings, SetupOptions setup) {
+  const std::string off = unloading_off(fit, closest).words();
+  if (off.empty()) return {};
+  std::vector<PreparedRecording> longer(recordings.begin(), recordings.end());
+  for (const RecordingFit& r : fit.recordings) {
+    longer[r.choice].to_s = end_of_unloading_s(r, longer[r.choice].to_s);
+  }
+  setup.profiles = false;
+  setup.placements = nullptr;
+  FitResult both;
+  const std::string failure = gave_up([&] {
+    both = run_fit(recording_config(fit.config.law.value(), longer, setup), data_sets(longer));
+  });
+  if (!failure.empty()) return off;
+  double worst = 0.0;
+  for (std::size_t i = 0; i < both.recordings.size(); ++i) {
+    const LoadingNoise noise = loading_noise(closest, closest.recordings[i]);
+    const LoadingNoise left = loading_noise(both, both.recordings[i]);
+    if (!(noise.degrees > 0.0)) continue;
+    const double times = both.recordings[i].rms_residual / noise.sd;
+    // Residuals that repeat each other and leave no degree of freedom are no noise.
+    const double degrees = std::max(left.degrees, 1.0);
+    if (fisher_tail(times * times, degrees, noise.degrees) < kAdequacyLevel)
+      worst = std::max(worst, times);
+  }
+  if (!(worst > 0.0)) return {};
+  return fmt::format("{}; fitted to both, the residual is {} times that", off, times_text(worst));
+}
+
+std::string hysteresis_of(const FitResult& fit) {
+  if (!fit.config.law || has_memory(*fit.config.law)) return {};
+  return unloading_off(fit, fit).words();
+}
 
 std::vector<UnloadingTest> test_unloading(const FitResult& fit, const std::vector<DataSet>& data) {
   std::vector<UnloadingTest> tests;

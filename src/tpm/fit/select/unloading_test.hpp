@@ -5,6 +5,8 @@
 
 #include "tpm/fit/fit.hpp"
 #include "tpm/fit/likelihood/experiment.hpp"
+#include "tpm/fit/select/recording_setup.hpp"
+#include "tpmkit/law.hpp"
 
 namespace tpm::fit {
 
@@ -40,5 +42,42 @@ struct UnloadingTest {
 ///         the parameters have no covariance
 [[nodiscard]] std::vector<UnloadingTest> test_unloading(const FitResult& fit,
                                                         const std::vector<DataSet>& data);
+
+/// True for a law with branches or a fractional element.
+[[nodiscard]] bool has_memory(const LawSpec& law);
+
+/// How far a law's prediction of the unloading behind the fitted part is off.
+struct UnloadingOff {
+  std::size_t samples = 0;  ///< compared, of all recordings; 0: nothing was tested
+  double times = 0.0;       ///< the residual of the loading: largest ratio that is no chance; or 0
+  /// "the unloading is off by 68 times the residual of the loading", or empty
+  [[nodiscard]] std::string words() const;
+};
+
+/// Compares the median residual of the first unloading, down to the drive at which the fitted part
+/// begins, with the residual of the loading (F test at 1 %). The parameters count as known: for the
+/// unloading that a law with memory predicts see test_unloading().
+/// @param closest the fit whose residuals are the noise of the loading, of the same recordings: of
+///        several laws that of the lowest BIC, lest a bad law is excused by its own residuals
+[[nodiscard]] UnloadingOff unloading_off(const FitResult& fit, const FitResult& closest);
+
+/// Whether a law describes loading and unloading together: from the loading alone its parameters,
+/// and so the unloading that it predicts, may hardly be known. It is fitted again to both, until
+/// the drive turns or the response has fallen to a fifth of the peak (contact may be lost there, or
+/// the probe adheres), and its residuals are compared with the noise of the loading (F test at 1
+/// %).
+/// @param fit of the loading
+/// @param closest as in unloading_off()
+/// @return "the unloading is off by ..., and by 12 times if it is fitted, too"; empty if it does
+[[nodiscard]] std::string both_off(const FitResult& fit, const FitResult& closest,
+                                   std::span<const PreparedRecording> recordings,
+                                   SetupOptions setup);
+
+/// A law without memory answers each depth with one force, in unloading as in loading: a hysteresis
+/// behind the fitted part contradicts it, whatever makes it (relaxation, adhesion), and what it
+/// calls the equilibrium.
+/// @return what is seen (unloading_off); empty if nothing speaks against the law, or it has a
+/// memory
+[[nodiscard]] std::string hysteresis_of(const FitResult& fit);
 
 }  // namespace tpm::fit

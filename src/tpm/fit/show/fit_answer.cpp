@@ -6,6 +6,7 @@
 #include <cmath>
 #include <map>
 
+#include "tpm/base/quantity_text.hpp"
 #include "tpm/base/sized_unit.hpp"
 #include "tpm/base/text.hpp"
 #include "tpm/fit/verdict.hpp"
@@ -83,6 +84,26 @@ std::string recording_words(const FitResult& fit, const RecordingFit& r) {
   }
   if (r.not_predicted > 0) text += fmt::format(", {} not predicted", r.not_predicted);
   return text;
+}
+
+/// "linear-2, which the data prefer: k_inf = 99.9 N/m (99.5 .. 100.4; identified), ..."
+std::string preferred_words(const Candidate& preferred) {
+  std::string text;
+  for (const ParameterResult& p : preferred.fit.parameters) {
+    if (p.nuisance) continue;
+    const double size = size_of(p);
+    const Unit unit = sized_unit(p.parameter.unit, size);
+    const std::string interval =
+        p.verdict == Verdict::not_profiled
+            ? ""
+            : fmt::format("{} .. {}; ", limit_text(p, false, unit), limit_text(p, true, unit));
+    text += fmt::format("{}{} = {} ({}{})", text.empty() ? "" : ", ", p.parameter.name,
+                        with_unit(estimate_text(p.estimate, size, unit), unit), interval,
+                        verdict_text(p));
+  }
+  const LawSpec& law = preferred.fit.config.law.value();
+  if (depends_on_reference(law)) text += "; " + reference_words(law);
+  return fmt::format("{}, which the data prefer: {}", law_name(law), text);
 }
 
 std::string starts_words(const FitResult& fit) {
@@ -176,6 +197,7 @@ ShortAnswer short_answer(const Selection& s) {
   if (fit.adequacy && !contains(s.summary, fit.adequacy->summary)) {
     answer.conclusion.insert(answer.conclusion.begin(), fit.adequacy->summary);
   }
+  if (s.preferred) answer.conclusion.push_back(preferred_words(s.candidates[*s.preferred]));
   answer.warnings = remark_texts(s.remarks);
   for (const Remark& remark : fit.remarks) answer.warnings.push_back(remark.text);
   return answer;
