@@ -13,6 +13,7 @@
 #include "tpm/files/import/reading_options.hpp"
 #include "tpm/fit/likelihood/fit_words.hpp"
 #include "tpm/fit/likelihood/load_imposed.hpp"
+#include "tpm/fit/recording/end_of_test.hpp"
 #include "tpm/fit/recording/kept_load.hpp"
 #include "tpm/fit/recording/loading_sense.hpp"
 #include "tpm/fit/recording/placement.hpp"
@@ -27,31 +28,6 @@
 
 namespace tpm::fit {
 namespace {
-
-/// True for creep and recovery of a specimen whose stress is imposed: it has no contact that could
-/// shrink when the stress falls, and what it recovers tells flow from a slow branch.
-bool recovers(const PreparedRecording& r) {
-  return r.load_imposed && r.recording.response_quantity == Quantity::strain;
-}
-
-bool is_after_the_test(PhaseKind kind) {
-  return kind == PhaseKind::unloading || kind == PhaseKind::detached || kind == PhaseKind::recovery;
-}
-
-/// A drive that overshoots falls back a little to where it is then held: that is no unloading.
-bool swings_back(const PreparedRecording& r, const Phase& phase) {
-  constexpr double kLittle = 0.1;  // of the travel
-  if (phase.kind != PhaseKind::unloading) return false;
-  const std::vector<double>& drive = r.recording.drive;
-  const double begin = r.phases.contact_found ? r.phases.contact_drive : drive.front();
-  const auto end = drive.begin() + static_cast<std::ptrdiff_t>(phase.last) + 1;
-  const double peak = *std::max_element(drive.begin(), end);
-  const bool held_later = std::ranges::any_of(r.phases.phases, [&](const Phase& later) {
-    return later.kind == PhaseKind::hold && later.first >= phase.last &&
-           peak - drive[later.first] <= kLittle * (peak - begin);
-  });
-  return held_later && peak - drive[phase.last] <= kLittle * (peak - begin);
-}
 
 /// Samples before contact that are kept where they are too few to measure the zero beforehand.
 constexpr std::size_t kBaseline = 10;
@@ -280,15 +256,7 @@ PreparedRecording prepare_recording(std::string name, Recording recording,
   } else {
     keep_baseline(r);
   }
-  r.to_s = time.back();
-  bool pressed = false;
-  for (const Phase& phase : r.phases.phases) {
-    pressed = pressed || phase.kind == PhaseKind::loading || phase.kind == PhaseKind::hold;
-    if (!pressed || !is_after_the_test(phase.kind) || swings_back(r, phase)) continue;
-    if (recovers(r)) break;
-    r.to_s = time[phase.first];
-    break;
-  }
+  r.to_s = end_of_test(r);
   end_before_unseen_motion(r);
   if (!r.load_imposed) find_clipping(r);
   if (const std::size_t rest = samples_before_load(r.recording); rest > 0) {
