@@ -178,6 +178,12 @@ std::string law_of_unloading(const Selection& s) {
   const std::size_t samples = unloading_off(closest.fit, closest.fit).samples;
   for (const Candidate& c : s.candidates) {
     if (c.failed || c.unloading_refutes) continue;
+    if (has_memory(c.law) && c.delta_bic <= kDecisiveBic) {  // judge_unloading() has tried it
+      return fmt::format(
+          "{} describes both if it is fitted to both, but the loading does not tell "
+          "its parameters ({})",
+          law_name(c.law), c.reason);
+    }
     const UnloadingOff off = unloading_off(c.fit, closest.fit);
     if (off.samples < samples || off.times > 0.0) continue;
     return fmt::format("{} describes the unloading, but is behind by {} in BIC of the loading",

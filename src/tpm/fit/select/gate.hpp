@@ -21,8 +21,9 @@ void judge_identified(Candidate& candidate, const ProtocolSpans& spans);
 void judge_unloading(Selection& s, std::span<const PreparedRecording> recordings,
                      const SetupOptions& setup);
 
-/// "hertz-1 describes the unloading, but is behind by 368 in BIC of the loading": the law of the
-/// lowest BIC that does; empty if none does.
+/// "hertz-1 describes the unloading, but is behind by 368 in BIC of the loading", or "hertz-1
+/// describes both if it is fitted to both, ...": of the lowest BIC; empty if none does. Where
+/// judge_unloading() has refuted the law of the lowest BIC.
 [[nodiscard]] std::string law_of_unloading(const Selection& s);
 
 /// Fits a law again with profiles.
