@@ -110,7 +110,7 @@ TEST_CASE("u_input counts that the calibration's own jump is not known", "[valid
   const double u_k1 = coordinate_slope(with.uncertainty->coordinate.at(static_cast<std::size_t>(k)),
                                        with.values.at(*of_k1)) *
                       std::sqrt(with.uncertainty->covariance(k, k));
-  const double by_delay = 45.0 / 2.0 * kJumpEvery_s / std::sqrt(12.0);
+  const double by_delay = 45.0 / 2.0 * 0.5 * kJumpEvery_s;
   CHECK(u_k1 > 0.8 * by_delay);
   CHECK(u_k1 < 1.5 * by_delay);
 }

@@ -10,6 +10,7 @@
 
 #include "tpm/base/distributions.hpp"
 #include "tpm/base/text.hpp"
+#include "tpm/fit/adequacy.hpp"
 #include "tpm/fit/conditional.hpp"
 #include "tpm/fit/verdict.hpp"
 
@@ -76,6 +77,7 @@ void doubt_loading(FitResult& fit) {
   constexpr double kMuchMore =
       4.0;  // mean square, in that of the noise: one spike moves no contact
   if (!fit.config.law || !(fit.variance_factor > 0.0)) return;
+  if (fit.adequacy && fit.adequacy->is_rejected()) return;
   for (const RecordingFit& r : fit.recordings) {
     if (r.drive_quantity != Quantity::indentation_depth || r.drive.empty()) continue;
     const LoadingMisfit misfit = misfit_of_loading(r, std::sqrt(fit.variance_factor));

@@ -18,6 +18,7 @@ void doubt_contact(FitResult& fit);
 /// them, and contact follows from them alone. Where they lie twice as far from the law as its
 /// noise goes, and one further than chance takes it (0.01 %), contact and the stiffnesses that are
 /// counted from it are not called identified (ParameterResult::unconfirmed), and a remark says so.
+/// Leaves a law alone that was found not to describe the recording.
 void doubt_loading(FitResult& fit);
 
 }  // namespace tpm::fit

@@ -163,7 +163,6 @@ void doubt_zero(FitResult& fit, std::span<const PreparedRecording> recordings) {
 void doubt_placement(FitResult& fit, std::span<const PreparedRecording> recordings) {
   doubt_contact(fit);
   doubt_zero(fit, recordings);
-  doubt_loading(fit);
 }
 
 void doubt_placement(FitResult& fit, const std::vector<DataSet>& data) {

@@ -16,6 +16,7 @@
 #include "tpm/fit/recording/carried_noise.hpp"
 #include "tpm/fit/recording/motion_before_load.hpp"
 #include "tpm/fit/select/configuration_remarks.hpp"
+#include "tpm/fit/select/doubtful_contact.hpp"
 #include "tpm/fit/select/doubtful_zero.hpp"
 #include "tpm/fit/select/gate.hpp"
 #include "tpm/fit/select/history_before_window.hpp"
@@ -418,6 +419,7 @@ void state_adequacy(FitResult& fit, std::span<const PreparedRecording> recording
   if (const auto worst = worst_of(fit, rested(recordings), fits)) {
     state(fit, stated(fit, *worst, 1, {}));
   }
+  doubt_loading(fit);
 }
 
 void state_preferred(Selection& s) {
@@ -443,6 +445,9 @@ void state_adequacy(Selection& s, std::span<const PreparedRecording> recordings)
   state_preferred(s);
   state_refuted(s);
   state_unloading(s, recordings);
+  for (const auto i : {std::optional(s.recommended), s.preferred}) {
+    if (i) doubt_loading(s.candidates[*i].fit);
+  }
 }
 
 void state_adequacy(FitResult& fit, const std::vector<DataSet>& data) {
@@ -473,6 +478,7 @@ FitResult fit_and_judge(const FitProblem& problem) {
   state_adequacy(fit, data);
   state_scatter(fit);
   repeat_choice(fit);
+  doubt_loading(fit);
   std::vector<Remark> remarks = configuration_remarks(fit, data, problem.data.empty());
   fit.remarks.insert(fit.remarks.begin(), std::make_move_iterator(remarks.begin()),
                      std::make_move_iterator(remarks.end()));
