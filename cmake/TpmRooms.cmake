@@ -18,7 +18,7 @@ endmacro()
 set(TPM_ARRANGING accuracy accuracy/show accuracy/stability accuracy/verify files files/blocks files/hdf5 files/import
     files/keys fit/design fit/expression fit/groups fit/online fit/predict fit/recording fit/select fit/show
     haptics/boundary haptics/formulations haptics/serve haptics/session haptics/show haptics/verify organ/run
-    organ/scene paper paper/claims paper/show plan plan/formulations plan/show show sweep sweep/show)
+    organ/scene paper paper/claims paper/show plan plan/formulations plan/show show sweep/show)
 # Those that are not optimised either in copies under sanitizers, or where TPM_QUICK_TO_BUILD asks for it.
 set(TPM_ARRANGING_QUICKLY data)
 
