@@ -28,15 +28,19 @@ double trend(std::span<const double> values, std::size_t row) {
   return (values[last] - values[first]) / static_cast<double>(last - first);
 }
 
-/// Largest step that rounding may have, of values of which some change.
+/// Largest step that rounding may have. Changes to and from the extremes do not count: the limit of
+/// a force cell lies beside the grid.
 double step_of(std::span<const double> values) {
-  constexpr std::size_t kSmallest = 20;  // one of so many
+  constexpr std::ptrdiff_t kSmallest = 20;  // one of so many
+  const auto [low, high] = std::ranges::minmax(values);
+  const auto extreme = [=](double value) { return value == low || value == high; };
   std::vector<double> changes;
   for (std::size_t i = 1; i < values.size(); ++i) {
-    if (values[i] != values[i - 1]) changes.push_back(std::abs(values[i] - values[i - 1]));
+    const double change = std::abs(values[i] - values[i - 1]);
+    if (change > 0.0 && !extreme(values[i]) && !extreme(values[i - 1])) changes.push_back(change);
   }
   if (changes.empty()) return HUGE_VAL;
-  const auto small = changes.begin() + std::ssize(changes) / std::ptrdiff_t{kSmallest};
+  const auto small = changes.begin() + std::ssize(changes) / kSmallest;
   std::ranges::nth_element(changes, small);
   return std::max(*small, quantum_of(values));
 }
