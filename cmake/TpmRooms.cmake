@@ -15,12 +15,11 @@ macro(tpm_room room)
 endmacro()
 
 # Folders that only arrange and write: they are optimised little (TPM_ARRANGING_FLAGS), for the compiler's time.
-set(TPM_ARRANGING accuracy accuracy/show accuracy/stability accuracy/verify files files/blocks files/hdf5 files/import
-    files/keys fit/design fit/expression fit/groups fit/online fit/predict fit/recording fit/select fit/show
-    haptics/boundary haptics/formulations haptics/serve haptics/session haptics/show haptics/verify organ/run
-    organ/scene paper paper/claims paper/show plan plan/formulations plan/show show sweep/show)
+set(TPM_ARRANGING accuracy accuracy/show accuracy/stability accuracy/verify fit/design fit/expression fit/groups fit/online
+    fit/predict fit/recording fit/select fit/show haptics/boundary haptics/formulations haptics/serve haptics/session
+    haptics/show haptics/verify organ/scene paper paper/claims paper/show plan plan/formulations plan/show show sweep/show)
 # Those that are not optimised either in copies under sanitizers, or where TPM_QUICK_TO_BUILD asks for it.
-set(TPM_ARRANGING_QUICKLY data)
+set(TPM_ARRANGING_QUICKLY data files files/blocks files/hdf5 files/import organ/run)
 
 # tpm_folders_of(LIST ROOM): the folders of a room that hold sources, as ROOM or ROOM/FOLDER.
 function(tpm_folders_of list room)
@@ -83,10 +82,6 @@ function(tpm_room_objects list room name suffix flags)
   set_source_files_properties(${PROJECT_SOURCE_DIR}/src/tpm/haptics/session/page_server.cpp
     PROPERTIES COMPILE_OPTIONS "${TPM_HTTPLIB_CFLAGS_OTHER}" SKIP_PRECOMPILE_HEADERS ON
                SKIP_UNITY_BUILD_INCLUSION ON)
-  # What reads each number of a long table, in folders that only arrange.
-  set_source_files_properties(${PROJECT_SOURCE_DIR}/src/tpm/files/checksum.cpp
-    ${PROJECT_SOURCE_DIR}/src/tpm/files/delimited.cpp ${PROJECT_SOURCE_DIR}/src/tpm/files/number_style.cpp
-    PROPERTIES COMPILE_OPTIONS "$<$<CONFIG:Release>:-O3>" SKIP_PRECOMPILE_HEADERS ON SKIP_UNITY_BUILD_INCLUSION ON)
   set(arranging ${TPM_ARRANGING})
   set(arranging_flags ${TPM_ARRANGING_FLAGS})
   if(suffix OR TPM_QUICK_TO_BUILD)

@@ -8,6 +8,7 @@
 #include "one_law.hpp"
 #include "tpm/base/random.hpp"
 #include "tpm/fit/recording/placement.hpp"
+#include "tpm/fit/recording/repeated_readings.hpp"
 #include "tpm/fit/recording/unseen_rises.hpp"
 #include "tpm/fit/select/channel_cause.hpp"
 #include "tpm/fit/select/selection.hpp"
@@ -15,6 +16,7 @@
 using namespace tpm;
 using namespace tpm::fit;
 using Catch::Contains;
+using Catch::StartsWith;
 using Catch::Matchers::WithinAbs;
 
 namespace {
@@ -164,4 +166,62 @@ TEST_CASE("where cycles turn is no rest", "[channels]") {
   CHECK(remarks.back().code == "fitted_part");
   CHECK_THAT(remarks.back().text, Contains("fitted from 2 to 6 s") &&
                                       Contains("\"to\" in config.json") && Contains("--until"));
+}
+
+namespace {
+
+/// As a logger writes readings that come once in so many rows.
+std::vector<double> held(std::vector<double> readings, std::size_t rows) {
+  for (std::size_t i = 0; i < readings.size(); ++i) readings[i] = readings[i - i % rows];
+  return readings;
+}
+
+/// Readings of a converter with steps in N, written with five digits behind the point.
+std::vector<double> converted(std::vector<double> readings, double step_N) {
+  for (double& f : readings) f = std::round(std::round(f / step_N) * step_N * 1e5) * 1e-5;
+  return readings;
+}
+
+}  // namespace
+
+TEST_CASE("readings that a logger repeats are named", "[channels][repeated]") {
+  Recording r = pressed_at_steps(ramp_of_two_seconds, 30.0, 3e-4);
+  const std::vector<double> force = r.response;
+  for (const std::size_t rows : {2, 5, 10}) {
+    CAPTURE(rows);
+    r.response = converted(held(force, rows), 1e-5);
+    CHECK_THAT(repeated_readings(r), StartsWith("the force repeats its last reading in "));
+    CHECK_THAT(repeated_readings(r), Contains(" rows while the depth moves: a logger that holds"));
+  }
+  const Selection s = selected_of_channels(prepare_recording("made.csv", r));
+  const LawAdequacy adequacy = s.candidates[s.recommended].fit.adequacy.value();
+  CHECK(adequacy.is_rejected());
+  REQUIRE_FALSE(adequacy.causes.empty());
+  CHECK(adequacy.causes.front().code == "readings_repeated");
+  CHECK_THAT(adequacy.summary, Contains("likely cause: the force repeats its last reading in "));
+  r.response = force;
+  Random random(5);
+  for (double& depth : r.drive) depth += 2e-6 * random.normal();
+  r.drive = held(r.drive, 5);
+  CHECK_THAT(repeated_readings(r), StartsWith("the depth repeats its last reading in "));
+}
+
+TEST_CASE("readings that repeat without a logger's doing are not named", "[channels][repeated]") {
+  const auto cycles = [](double t) { return 1e-3 * std::abs(std::remainder(t, 4.0)); };
+  const auto stairs = [](double t) { return 2e-4 * std::floor(std::clamp(2.0 * t, 0.0, 20.0)); };
+  const std::vector<std::function<double(double)>> paths{ramp_of_two_seconds, cycles, stairs};
+  for (std::size_t path = 0; path < paths.size(); ++path) {
+    for (const double noise_N : {0.0, 1e-5, 3e-4, 3e-3, 0.03}) {
+      Recording r = pressed_at_steps(paths[path], 30.0, noise_N, {});
+      const std::vector<double> force = r.response;
+      const double peak = *std::ranges::max_element(force);
+      for (const double step : {1e-5, 1e-4, 1.23e-3, 3.7e-3, 0.0123, 0.047}) {
+        r.response = converted(force, step);
+        CAPTURE(path, noise_N, step);
+        CHECK(repeated_readings(r) == "");
+        for (double& f : r.response) f = std::min(f, 0.7 * peak);
+        CHECK(repeated_readings(r) == "");
+      }
+    }
+  }
 }

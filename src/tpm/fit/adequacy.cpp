@@ -296,6 +296,7 @@ std::vector<Remark> causes_of(const AdequacyData& data, const RestNoise& noise, 
                      significant(lost->at_s, 4), lost->to_the_end ? "to the end" : "back",
                      lost->to_the_end ? "" : " under a load")});
   }
+  if (!data.repeated.empty()) causes.push_back({"readings_repeated", data.repeated});
   if (const auto run = frozen_run(data, noise); run && causes.empty()) {
     causes.push_back(
         {"signal_frozen",

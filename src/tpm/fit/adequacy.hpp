@@ -34,7 +34,8 @@ struct AdequacyData {
   int parameters = 0;                   ///< fitted, 0 or more
   /// Variance that the noise of the imposed channel adds to the residual and not to the rest.
   double carried_variance = 0.0;
-  double ramp_to_s = 0.0;  ///< where the drive first reaches its largest value, among the fitted
+  double ramp_to_s = 0.0;     ///< where the drive first reaches its largest value, among the fitted
+  std::string repeated = {};  ///< words on readings that a logger repeats; empty: none
 };
 
 /// Straight trend of the readings at rest.

@@ -15,6 +15,7 @@
 #include "tpm/fit/likelihood/load_imposed.hpp"
 #include "tpm/fit/recording/carried_noise.hpp"
 #include "tpm/fit/recording/motion_before_load.hpp"
+#include "tpm/fit/recording/repeated_readings.hpp"
 #include "tpm/fit/select/configuration_remarks.hpp"
 #include "tpm/fit/select/doubtful_contact.hpp"
 #include "tpm/fit/select/doubtful_zero.hpp"
@@ -73,23 +74,22 @@ Adequacy adequacy_of(const RecordingFit& fit, const RestedRecording& rested, int
                      double level) {
   const Recording& r = *rested.recording;
   const std::size_t end = std::min(rested.at_rest, r.time_s.size());
-  std::vector<double> rest_time, rest;
+  std::vector<double> rest_time, rest, time, reading, residual;
   const std::vector<bool> spikes = spikes_at_rest(std::span(r.response).first(end));
   for (std::size_t i = 0; i < end; ++i) {
     if (spikes[i]) continue;
     rest_time.push_back(r.time_s[i]);
     rest.push_back(r.response[i]);
   }
-  std::vector<double> time, reading, residual;
   for (std::size_t i = 0; i < fit.time_s.size(); ++i) {
     if (!fit.fitted[i] || !std::isfinite(fit.predicted[i])) continue;
     time.push_back(fit.time_s[i]);
     reading.push_back(fit.observed[i]);
     residual.push_back(fit.observed[i] - fit.predicted[i]);
   }
-  const double carried = carried_variance(fit, r, end);
-  return judge_adequacy(
-      {rest_time, rest, time, reading, residual, parameters, carried, ramp_end_s(fit)}, level);
+  return judge_adequacy({rest_time, rest, time, reading, residual, parameters,
+                         carried_variance(fit, r, end), ramp_end_s(fit), repeated_readings(r)},
+                        level);
 }
 
 /// The drift of a recording that the fit takes, where it is further from what the rests show than
