@@ -15,16 +15,16 @@
 namespace tpm::fit {
 namespace {
 
-constexpr std::size_t kReach = 16;   // rows on each side
-constexpr std::size_t kFewest = 20;  // rows that move
-constexpr std::size_t kStretches = 5;
-constexpr double kRepeated = 0.4;  // of the rows that move
-constexpr double kGoesOn = 0.5;    // of the trend
+constexpr std::size_t kRowsAround = 16;    // rows on each side
+constexpr std::size_t kFewestMoving = 20;  // rows that move
+constexpr std::size_t kFewestTimes = 5;
+constexpr double kShareRepeated = 0.4;  // of the rows that move
+constexpr double kShareOfTrend = 0.5;   // of the trend
 
 /// Change from row to row, about the row.
 double trend(std::span<const double> values, std::size_t row) {
-  const std::size_t first = row > kReach ? row - kReach - 1 : 0;
-  const std::size_t last = std::min(row + kReach, values.size() - 1);
+  const std::size_t first = row > kRowsAround ? row - kRowsAround - 1 : 0;
+  const std::size_t last = std::min(row + kRowsAround, values.size() - 1);
   return (values[last] - values[first]) / static_cast<double>(last - first);
 }
 
@@ -58,9 +58,9 @@ struct Repeats {
   double other_expected = 0.0;  ///< by its trend
 
   [[nodiscard]] bool is_held() const {
-    return moving >= kFewest && stretches >= kStretches &&
-           static_cast<double>(repeated) >= kRepeated * static_cast<double>(moving) &&
-           other_expected > 0.0 && other_moved >= kGoesOn * other_expected;
+    return moving >= kFewestMoving && stretches >= kFewestTimes &&
+           static_cast<double>(repeated) >= kShareRepeated * static_cast<double>(moving) &&
+           other_expected > 0.0 && other_moved >= kShareOfTrend * other_expected;
   }
 };
 
@@ -68,7 +68,7 @@ Repeats repeats_in(std::span<const double> values, std::span<const double> other
   constexpr double kSteps = 3.0;
   Repeats found;
   // Most recordings repeat too little to be looked at closely.
-  if (repeats_of(values) < static_cast<std::size_t>(kRepeated * kFewest)) return found;
+  if (repeats_of(values) < static_cast<std::size_t>(kShareRepeated * kFewestMoving)) return found;
   const double least = kSteps * step_of(values);
   bool before = false;  // repeats, too
   for (std::size_t i = 1; i < values.size(); ++i) {
