@@ -1,12 +1,8 @@
 // A strain that does not start at 0: what it counts from is said.
 #include <algorithm>
 #include <catch2/catch.hpp>
-#include <cmath>
-#include <numbers>
 #include <string>
 
-#include "support/fitted_parameter.hpp"
-#include "support/one_law.hpp"
 #include "support/remarks.hpp"
 #include "tpm/base/random.hpp"
 #include "tpm/fit/select/selection.hpp"
@@ -64,38 +60,4 @@ TEST_CASE("a strain that starts away from 0 is said to count from there", "[plac
   options.only_listed = true;
   options.held_out = false;
   CHECK(test::has_remark(select_law({&unloaded, 1}, options).remarks, "strain_from_start"));
-}
-
-TEST_CASE("A specimen that is pulled as well as pressed is fitted to its end", "[strain]") {
-  // Six sines about 0; the stress by the recursion of one branch, exact for straight pieces.
-  constexpr double kStep_s = 0.01, kPlateau = 2000.0, kBranch = 1500.0, kTime_s = 0.4;
-  Random random(16);
-  Recording r;
-  r.drive_quantity = Quantity::strain;
-  r.response_quantity = Quantity::stress;
-  const double decay = std::exp(-kStep_s / kTime_s);
-  double branch = 0.0;
-  for (int i = 0; i < 2000; ++i) {
-    double strain = 0.0;
-    for (const double rate_Hz : {0.05, 0.13, 0.31, 0.7, 1.7, 3.1}) {
-      strain += 4e-3 * std::sin(2.0 * std::numbers::pi * rate_Hz * kStep_s * i);
-    }
-    const double moved = r.drive.empty() ? 0.0 : strain - r.drive.back();
-    branch = decay * branch + kBranch * kTime_s * (1.0 - decay) / kStep_s * moved;
-    r.time_s.push_back(kStep_s * i);
-    r.drive.push_back(strain);
-    r.response.push_back(kPlateau * strain + branch + 0.2 * random.normal());
-  }
-  const PreparedRecording oscillated = prepare_recording("shear.csv", std::move(r));
-  CHECK(oscillated.to_s == oscillated.recording.time_s.back());
-  const Selection s = test::select_one("linear-1", oscillated, test::setup_of(4, true));
-  const FitResult& fit = s.candidates[s.recommended].fit;
-  for (const auto& [name, truth] :
-       {std::pair("k_inf", kPlateau), std::pair("k1", kBranch), std::pair("tau1", kTime_s)}) {
-    const ParameterResult& p = find(fit, name);
-    INFO(p.summary);
-    CHECK(p.lower.value() <= truth);
-    CHECK(p.upper.value() >= truth);
-    CHECK(p.upper.value() - p.lower.value() < 0.05 * truth);
-  }
 }

@@ -12,19 +12,6 @@ bool recovers(const PreparedRecording& r) {
   return r.load_imposed && r.recording.response_quantity == Quantity::strain;
 }
 
-/// True if strain and stress go to both sides of where they start: an oscillation in shear, or of a
-/// specimen that is glued or gripped.
-bool goes_both_ways(const PreparedRecording& r) {
-  constexpr double kMuch = 0.3;  // of the larger side
-  const auto both_sides = [](const std::vector<double>& values) {
-    const auto [low, high] = std::ranges::minmax_element(values);
-    const double below = values.front() - *low, above = *high - values.front();
-    return std::min(below, above) > kMuch * std::max(below, above);
-  };
-  return !r.load_imposed && r.recording.drive_quantity == Quantity::strain &&
-         both_sides(r.recording.drive) && both_sides(r.recording.response);
-}
-
 bool is_after_the_test(PhaseKind kind) {
   return kind == PhaseKind::unloading || kind == PhaseKind::detached || kind == PhaseKind::recovery;
 }
@@ -48,7 +35,6 @@ bool swings_back(const PreparedRecording& r, const Phase& phase) {
 
 double end_of_test(const PreparedRecording& r) {
   const std::vector<double>& time = r.recording.time_s;
-  if (goes_both_ways(r)) return time.back();
   bool pressed = false;
   for (const Phase& phase : r.phases.phases) {
     pressed = pressed || phase.kind == PhaseKind::loading || phase.kind == PhaseKind::hold;

@@ -4,8 +4,7 @@
 namespace tpm::fit {
 
 /// Time to which a recording is fitted, s: where the drive first falls back, because a contact may
-/// shrink from there on. Creep of a strain is fitted with its recovery, and a specimen that is
-/// pulled as well as pressed from the beginning to its end: neither has a contact.
+/// shrink from there on. Creep of a strain has none, and is fitted with its recovery.
 [[nodiscard]] double end_of_test(const PreparedRecording& recording);
 
 }  // namespace tpm::fit
